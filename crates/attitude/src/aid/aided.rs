@@ -11,10 +11,10 @@ use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
 use nalgebra::Matrix3;
 use std::collections::VecDeque;
 
-/// Of an attitude that was saved, rad: it is never known better.
+/// Least sigma of the tilt of an attitude that was saved, rad.
 const TILT_RESUMED: f64 = 0.02;
 
-/// What is known of the attitude at the first sample.
+/// Knowledge of the attitude at the first sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Start {
     /// Nothing: it is levelled by the first specific force.
@@ -26,7 +26,7 @@ pub enum Start {
     Known {
         /// Standard deviation of its tilt, rad.
         tilt: f64,
-        /// Of its heading.
+        /// Sigma of its heading.
         heading: f64,
     },
 }
@@ -69,7 +69,7 @@ pub struct Aided {
     pub(super) propagator: Propagator,
     pub(super) filter: Filter,
     start: Start,
-    /// What is known where the attitude begins that is begun with now, and where the next reset does.
+    /// Knowledge of the attitude at the beginning, and of where the next reset leads.
     begins: Start,
     anew: Option<Start>,
     /// The attitude is not that of this stream's beginning, but one that was saved.
@@ -80,11 +80,11 @@ pub struct Aided {
     /// Given to the propagator, whose attitudes have not come out yet.
     pub(super) given: VecDeque<Given>,
     pub(super) last: Option<Nanos>,
-    /// What goes into the propagator at once, and what comes out of it.
+    /// Samples that go into the propagator at once, and what comes out of it.
     corrected: Vec<RateSample>,
     scratch: Vec<AttitudeSample>,
     pub(super) last_out: Option<Quaternion<Nav, Body>>,
-    /// Where somebody looks at them.
+    /// Innovations, if somebody looks at them.
     innovations: Option<Vec<(Nanos, Innovation)>>,
 }
 
@@ -145,7 +145,7 @@ impl Aided {
         self.innovations.get_or_insert_default();
     }
 
-    /// Those kept since this was asked last, each with the stamp of the correction.
+    /// Takes the innovations kept since the last call, each with the stamp of the correction.
     pub fn innovations(&mut self) -> Vec<(Nanos, Innovation)> {
         self.innovations
             .as_mut()
@@ -158,7 +158,7 @@ impl Aided {
         self.forces.is_some()
     }
 
-    /// From now on, as after [`Aided::with_forces_beside`].
+    /// Expects forces on a topic of their own from now on, as after [`Aided::with_forces_beside`].
     pub fn expect_forces_beside(&mut self) {
         self.forces.get_or_insert_default();
     }
@@ -232,8 +232,8 @@ impl Aided {
         }
     }
 
-    /// How many of these samples, one at least, are corrected by what is known now: those that come before the attitude
-    /// at which the filter will know more is out. Several at once cost the propagator less than one by one.
+    /// Number of these samples, one at least, that are corrected by what is known now: those that come before the
+    /// attitude at which the filter will know more is out. Several at once cost the propagator less than one by one.
     fn alike(&self, samples: &[RateSample]) -> usize {
         let latency = self.propagator.latency();
         // The first of a run comes out at once.
@@ -387,7 +387,7 @@ impl Aided {
         has_corrected
     }
 
-    /// What is known at a first sample: of an attitude that was saved, what the propagator says of it by now.
+    /// Knowledge at a first sample: of an attitude that was saved, what the propagator says of it by now.
     fn start_at(&mut self, propagated: &AttitudeSample) -> Start {
         if !std::mem::take(&mut self.is_resumed) {
             return self.begins;

@@ -23,15 +23,15 @@ pub(crate) struct Beside {
     last: Option<Vector3<f64>>,
     /// Whether one that equals the one before it is that one again.
     has_repeats: bool,
-    /// Those that no gyro sample was near.
+    /// Number of those that no gyro sample was near.
     pub(super) unpaired: u64,
     pub(super) paired: u64,
-    /// Those that are no numbers.
+    /// Number of those that are no numbers.
     pub(super) not_finite: u64,
 }
 
 impl Beside {
-    /// Of a sensor whose messages may say the same measurement several times.
+    /// Makes it for a sensor whose messages may state the same measurement several times.
     pub(crate) fn with_repeats() -> Beside {
         Beside {
             has_repeats: true,
@@ -70,7 +70,7 @@ impl Beside {
         self.waiting.len() <= MOST && self.waiting.iter().all(is_number)
     }
 
-    /// No gyro sample follows.
+    /// Ends it: no gyro sample follows.
     pub(super) fn finish(&mut self) {
         self.unpaired += self.waiting.len() as u64;
         self.waiting.clear();

@@ -1,4 +1,4 @@
-//! What is known of the sensor: raw rate -> true rate. Pure.
+//! Calibration of the sensor: raw rate -> true rate. Pure.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -47,7 +47,7 @@ impl Calibration {
     }
 }
 
-/// What of a calibration a rate is corrected by.
+/// Part of a calibration by which a rate is corrected.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Applied {
@@ -70,7 +70,7 @@ impl Applied {
     }
 }
 
-/// What is zero to the bit takes no place in a text.
+/// Whether it is zero to the bit, and so takes no place in a text.
 #[cfg(feature = "serde")]
 pub(super) fn is_nothing(v: &Vector3<f64>) -> bool {
     v.iter().all(|c| c.to_bits() == 0)

@@ -5,9 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 /// Error states: tilt x, y and heading (rad, earth axes), velocity x, y, position x, y, gyro bias, scale, cross,
 /// accelerometer bias, its lead, disturbance of the field's heading (nothing without a magnetometer).
 pub(super) const STATES: usize = 21;
-/// With hard iron, where it is asked for. Rows are as long in any case: a multiple of what a vector register holds.
+/// Width of a row with hard iron, if it is asked for. Rows are as long in any case: a multiple of what a vector
+/// register holds.
 pub(super) const WIDTH: usize = 24;
-/// Of the states that change by themselves, the first so many.
+/// Number of states, the first ones, that change by themselves.
 const MOVING: usize = 7;
 
 pub(super) const TILT: usize = 0;
@@ -25,7 +26,8 @@ pub(super) const IRON: usize = 21;
 /// A correction of the error states, and of nothing beyond them.
 pub(super) type Correction = [f64; WIDTH];
 
-/// Columns of the rows of a [`Transition`] that are not zero, in order: what tilt and heading, velocity and position hang on.
+/// Columns of the rows of a [`Transition`] that are not zero, in order: what tilt and heading, velocity and position
+/// hang on.
 const COLUMNS: [&[usize]; MOVING] = [
     &BY_GYRO,
     &BY_GYRO,
@@ -61,7 +63,7 @@ impl Transition {
 )]
 pub(super) struct Covariance {
     rows: [[f64; WIDTH]; WIDTH],
-    /// So many of them are of states: [`STATES`], or all.
+    /// Number of states: [`STATES`], or all.
     states: usize,
 }
 
@@ -119,7 +121,7 @@ impl Covariance {
         self.rows[a][b]
     }
 
-    /// What two states have in common, at the start.
+    /// Sets the covariance of two states, at the start.
     pub(super) fn set(&mut self, a: usize, b: usize, covariance: f64) {
         self.rows[a][b] = covariance;
         self.rows[b][a] = covariance;
@@ -268,7 +270,7 @@ impl Covariance {
         }
     }
 
-    /// Of tilt and heading, rad^2, earth axes.
+    /// Covariance of tilt and heading, rad^2, earth axes.
     pub(super) fn attitude(&self) -> Matrix3<f64> {
         Matrix3::from_fn(|i, j| self.rows[i][j])
     }

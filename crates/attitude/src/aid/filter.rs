@@ -21,18 +21,18 @@ pub(super) const COLOURED: f64 = 2.0;
 const LARGEST_FORCE: f64 = 1000.0;
 /// A field beyond this (each component, whatever its unit) is none.
 const LARGEST_FIELD: f64 = 1e6;
-/// How long a specific force counts for the present, s.
+/// Time for which a specific force counts for the present, s.
 const FORCE_SECS: f64 = 0.5;
 /// One sigma of the scale, and of the angles between the axes (rad), of a gyro that is none of its class.
 const WIDE: f64 = 0.01;
-/// After so many gaps in a row the sensor has become slower.
+/// Number of gaps in a row after which the sensor has become slower.
 const GAPS_IN_A_ROW: u32 = 20;
 
 /// One sample as it was measured, and the attitude it led to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Measured {
-    /// Since the sample before, s.
+    /// Time since the sample before, s.
     pub secs: f64,
     /// The gyro, rad/s, body axes: at the instant or its mean since the sample before.
     pub rate: Vector3<f64>,
@@ -42,7 +42,7 @@ pub(crate) struct Measured {
     pub field: Option<Vector3<f64>>,
 }
 
-/// What happened.
+/// Counts of what happened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Report {
@@ -70,13 +70,13 @@ pub struct Report {
     pub failures: u64,
 }
 
-/// How far what was measured was from what was expected, with one sigma of that, rad; NaN where nothing was measured.
+/// Innovation: measured less expected, with one sigma of that, rad; NaN where nothing was measured.
 /// Its sigma follows the accelerations that are seen, so it is the mean that tells a wrong model: it should be nothing.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Innovation {
-    /// Of gravity, as the tilt it would be: the specific force along x and y of the world, over gravity.
+    /// Innovation of gravity, as the tilt it would be: the specific force along x and y of the world, over gravity.
     pub gravity: [(f64, f64); 2],
-    /// Of the heading by the field.
+    /// Innovation of the heading by the field.
     pub heading: (f64, f64),
 }
 
@@ -100,12 +100,12 @@ pub struct Filter {
     pub(super) covariance: Covariance,
     pub(super) calibration: Calibration,
     pub(super) known: Applied,
-    /// What the propagator's attitude is turned by, from the left.
+    /// Rotation of the propagator's attitude, from the left.
     pub(super) correction: Quaternion<Nav, Nav>,
-    /// Of the motion, horizontal, m/s and m.
+    /// Velocity and position of the motion, horizontal, m/s and m.
     pub(super) velocity: [f64; 2],
     pub(super) position: [f64; 2],
-    /// Of the field's heading, rad.
+    /// Disturbance of the field's heading, rad.
     pub(super) disturbance: f64,
     pub(super) interval: Interval,
     pub(super) rest: Rest,
@@ -125,18 +125,18 @@ pub struct Filter {
     pub(super) last_force: Option<Vector3<f64>>,
     pub(super) since_force: f64,
     pub(super) plausibility: Plausibility,
-    /// Since the sample before.
+    /// Whether it was levelled since the sample before.
     pub(super) has_levelled: bool,
     /// The gyro was found to be none of its class, and its scale and axes are looked for farther off.
     pub(super) is_widened: bool,
-    /// Of the last correction.
+    /// Innovation of the last correction.
     pub(super) innovation: Innovation,
     pub(super) report: Report,
 }
 
 impl Filter {
-    /// For a gyro whose samples are rates at their instants (`is_instant`) or means since the sample before, in
-    /// a world that turns at `world_rate` (rad/s).
+    /// Makes one for a gyro whose samples are rates at their instants (`is_instant`) or means since the sample
+    /// before, in a world that turns at `world_rate` (rad/s).
     #[must_use]
     pub(crate) fn new(settings: Settings, is_instant: bool, world_rate: In<Nav>) -> Filter {
         let calibration = Calibration::default();
@@ -175,7 +175,7 @@ impl Filter {
         filter
     }
 
-    /// What is known of the sensor by now.
+    /// Calibration of the sensor by now.
     #[must_use]
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
@@ -197,8 +197,10 @@ impl Filter {
         }
     }
 
-    /// Whether what was learned of the gyro's scale and axes lies two of its prior sigmas off, or the accelerometer's bias
-    /// three: then the sensor is none of that class, and the sigma of the attitude has been too small. Not asked of priors
+    /// Whether what was learned of the gyro's scale and axes lies two of its prior sigmas off, or the accelerometer's
+    /// bias
+    /// three: then the sensor is none of that class, and the sigma of the attitude has been too small. Not asked of
+    /// priors
     /// that a calibration gave. The bounds tell the 14 recordings of BROAD from simulated units that nobody calibrated.
     #[must_use]
     pub fn is_beyond_class(&self) -> bool {
@@ -241,17 +243,18 @@ impl Filter {
         SMatrix::from_fn(|i, j| COLOURED * self.covariance.between(first + i, first + j))
     }
 
-    /// Of the gyro's bias, (rad/s)^2; of its scale and axes; of the accelerometer's bias, (m/s^2)^2. Body axes.
+    /// Covariances of the gyro's bias, (rad/s)^2; of its scale and axes; of the accelerometer's bias, (m/s^2)^2. Body
+    /// axes.
     pub(crate) fn calibration_covariance(&self) -> (Matrix3<f64>, Matrix6<f64>, Matrix3<f64>) {
         (self.block(BIAS), self.block(SCALE), self.block(FORCE_BIAS))
     }
 
-    /// Of the accelerometer's lead, s.
+    /// Sigma of the accelerometer's time offset, s.
     pub(crate) fn lead_sigma(&self) -> f64 {
         self.block::<1>(LEAD)[(0, 0)].max(0.0).sqrt()
     }
 
-    /// Of hard iron, where it is looked for: covariance, and what it was taken for at the start, in the field's unit.
+    /// Covariance of hard iron, if it is looked for, and what it was taken for at the start, in the field's unit.
     pub(crate) fn hard_iron_covariance(&self) -> Option<(Matrix3<f64>, f64)> {
         let prior = self.settings.hard_iron * self.surroundings.mean_norm();
         self.covariance
@@ -259,12 +262,12 @@ impl Filter {
             .then(|| (self.block(IRON), prior))
     }
 
-    /// What it was told.
+    /// Settings.
     pub(crate) fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// What it took the sigma of the accelerometer's lead for at the start, s.
+    /// Sigma of the accelerometer's time offset at the start, s.
     pub(crate) fn lead_prior(&self) -> f64 {
         let settings = &self.settings;
         // The second part is added by the first correction.
@@ -277,7 +280,7 @@ impl Filter {
         settings.prior.lead_sigma.unwrap_or(class)
     }
 
-    /// What the rates that come now are to be corrected by.
+    /// Calibration by which the rates that come now are to be corrected.
     pub(crate) fn applied(&self) -> Applied {
         self.known
     }
@@ -302,13 +305,13 @@ impl Filter {
         self.settings.has_field
     }
 
-    /// What happened so far.
+    /// Report of what happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
         self.report
     }
 
-    /// What became of vectors that were measured beside the gyro.
+    /// Counts vectors that were measured on topics of their own.
     pub(super) fn count_beside(&mut self, forces: Option<&Beside>, fields: &Beside) {
         self.report.fields = fields.paired;
         self.report.fields_unpaired = fields.unpaired + fields.not_finite;
@@ -333,7 +336,7 @@ impl Filter {
         self.plausibility.is_denied()
     }
 
-    /// What it is to say of an attitude, which is that of the last sample it took.
+    /// Status of an attitude, which is that of the last sample it took.
     pub(crate) fn status(&self) -> Status {
         if !self.is_started || self.is_force_implausible() {
             return Status::OK;
@@ -365,7 +368,7 @@ impl Filter {
         (attitude.normalised(), *attitude.to_dcm().as_matrix())
     }
 
-    /// When it will correct next.
+    /// Time of the next correction.
     pub(crate) fn due(&self) -> Due {
         Due {
             secs: self.interval.secs,
@@ -373,8 +376,8 @@ impl Filter {
         }
     }
 
-    /// Takes the next sample after it has begun, whose rate the propagator was given corrected by `known`. `r` is the matrix
-    /// of its attitude, corrected, at the sample's instant. Whether that has been corrected further.
+    /// Takes the next sample after it has begun, whose rate the propagator was given corrected by `known`. `r` is the
+    /// matrix of its attitude, corrected, at the sample's instant. Whether that has been corrected further.
     pub(crate) fn take(&mut self, sample: &Measured, known: &Applied, r: &Matrix3<f64>) -> bool {
         let secs = sample.secs;
         self.has_levelled = false;
@@ -480,7 +483,7 @@ impl Filter {
         Some(measured)
     }
 
-    /// What a gap, a jump or the end of the gyro's range leaves unknown of a turn.
+    /// Adds what a gap, a jump or the end of the gyro's range leaves unknown of a rotation.
     fn doubt_turn(&mut self, sample: &Measured, is_gap: bool) {
         let secs = sample.secs;
         let jump = sample.rate - self.last_rate;
@@ -534,7 +537,7 @@ fn is_due(secs: f64, step: f64, update_secs: f64) -> bool {
     secs >= update_secs - 0.25 * step
 }
 
-/// How long it is until the next correction.
+/// Time until the next correction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Due {
     secs: f64,

@@ -16,9 +16,9 @@ const MEAN_SECS: f64 = 2.0;
 pub(super) struct Force {
     /// Less gravity, m/s^2, earth axes.
     pub(super) acceleration: Vector3<f64>,
-    /// Its vertical component, gravity included, m/s^2.
+    /// Vertical component, gravity included, m/s^2.
     pub(super) up: f64,
-    /// What it changes by for an accelerometer bias of 1 m/s^2 (three columns) and a lead of 1 s.
+    /// Change for an accelerometer bias of 1 m/s^2 (three columns) and a time offset of 1 s.
     pub(super) by_calibration: [[f64; 4]; 2],
 }
 

@@ -33,7 +33,7 @@ pub struct FieldQuality {
 }
 
 impl Filter {
-    /// What the field is like; `None` before the first.
+    /// Quality of the field; `None` before the first.
     #[must_use]
     pub fn field(&self) -> Option<FieldQuality> {
         let Field { norm, dip } = self.surroundings.reference?;

@@ -4,21 +4,21 @@ use super::calibration::Applied;
 use super::memory::LARGEST;
 use nalgebra::{Matrix3, Vector3};
 
-/// What is added up between two corrections. Earth axes but for `rate`.
+/// Sums between two corrections. Earth axes but for `rate`.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Interval {
-    /// How long it is, s.
+    /// Length, s.
     pub(super) secs: f64,
-    /// How much of it has a specific force, s.
+    /// Time that has a specific force, s.
     pub(super) force_secs: f64,
     /// Integral of the attitude matrix, s.
     pub(super) attitude: Matrix3<f64>,
-    /// What the attitude changes by for a scale (columns 0 to 2) or a cross axis (3 to 5) of 1, rad.
+    /// Change of the attitude for a scale (columns 0 to 2) or a cross axis (3 to 5) of 1, rad.
     pub(super) scaled: [[f64; 6]; 3],
     /// Integral of the specific force, m/s.
     pub(super) force: Vector3<f64>,
-    /// Its change for a lead of 1 s.
+    /// Change for a time offset of 1 s.
     pub(super) lead: Vector3<f64>,
     /// Integral of the measured rate, rad, body axes.
     pub(super) rate: Vector3<f64>,

@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 
 /// Most samples that wait for their attitude: no window looks further ahead.
 const MOST_GIVEN: usize = 64;
-/// No sensor is off by more: rad/s, of 1, m/s^2, s.
+/// Largest errors of a sensor: rad/s, of 1, m/s^2, s.
 const BIAS: f64 = 10.0;
 const SCALE: f64 = 0.5;
 const FORCE_BIAS: f64 = 100.0;
@@ -73,7 +73,7 @@ pub struct Memory {
 }
 
 impl Aided {
-    /// What it and its propagator know; `None` before the first sample of a run.
+    /// States of it and of its propagator; `None` before the first sample of a run.
     #[must_use]
     pub fn memory(&self) -> Option<(propagate::Memory, Memory)> {
         let propagation = self.propagator.memory()?;

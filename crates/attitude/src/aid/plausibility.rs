@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 /// First and last time at which it is judged, s.
 const FIRST: f64 = 1.0;
 const LAST: f64 = 4.0;
-/// How far the mean may be from gravity, as a share: what sensors are off by.
+/// Largest deviation of the mean from gravity, as a share: errors of sensors.
 const SHARE: f64 = 0.15;
 /// Change of velocity that bodies are capable of meanwhile, m/s.
 const VELOCITY: f64 = 0.7;
@@ -23,7 +23,7 @@ pub(crate) fn is_gravity(length: f64, secs: f64, gravity: f64) -> bool {
     (length - gravity).abs() <= SHARE * gravity + VELOCITY / secs
 }
 
-/// What has been seen of the forces.
+/// Verdict on the forces seen so far.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Plausibility {
@@ -32,9 +32,9 @@ pub(super) enum Plausibility {
     Open,
     /// The same, begun.
     Seen(Vector3<f64>, f64),
-    /// They are specific forces.
+    /// Specific forces.
     Given,
-    /// They are none.
+    /// Other quantities.
     Denied,
 }
 

@@ -1,23 +1,23 @@
-//! What is known of a sensor beforehand -> what the filter begins with. Pure.
+//! Knowledge of a sensor beforehand -> what the filter begins with. Pure.
 
 use super::calibration::Calibration;
 use super::covariance::{BIAS, Covariance, FORCE_BIAS, IRON, LEAD, SCALE};
 use super::settings::Settings;
 use nalgebra::{Matrix3, Matrix6};
 
-/// What is known of a sensor before its first sample, beside what was taken out of its samples already. Body axes;
+/// Knowledge of a sensor before its first sample, beside what was taken out of its samples already. Body axes;
 /// `None`: no better than of any sensor.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Prior {
     /// Covariance of what is left of the gyro's bias, (rad/s)^2.
     pub bias: Option<Matrix3<f64>>,
-    /// Of its scale (x, y, z) and axes (xy, xz, yz).
+    /// Covariance of its scale (x, y, z) and axes (xy, xz, yz).
     pub scale: Option<Matrix6<f64>>,
-    /// Of what is left of the accelerometer's bias, (m/s^2)^2.
+    /// Covariance of what is left of the accelerometer's bias, (m/s^2)^2.
     pub force_bias: Option<Matrix3<f64>>,
     /// The accelerometer's lead, s.
     pub lead: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the time offset.
     pub lead_sigma: Option<f64>,
     /// Covariance of what is left of hard iron, in squares of the field's unit.
     pub hard_iron: Option<Matrix3<f64>>,

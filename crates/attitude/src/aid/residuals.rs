@@ -3,7 +3,7 @@
 use super::memory::LARGEST;
 use super::settings::Settings;
 
-/// What residuals have been like.
+/// Statistics of residuals.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Residuals {

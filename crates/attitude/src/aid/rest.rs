@@ -20,7 +20,7 @@ const DRIFT: f64 = 0.002;
 pub(super) struct Rest {
     rate: Vector3<f64>,
     force: Vector3<f64>,
-    /// How long all has been quiet, s.
+    /// Time for which all has been quiet, s.
     quiet: f64,
     /// Mean rates (rad/s) and lengths (s) of the last intervals since all became quiet.
     open: VecDeque<(Vector3<f64>, f64)>,

@@ -1,4 +1,4 @@
-//! What the filter is told about sensors and motions. Pure.
+//! Settings of the filter about sensors and motions. Pure.
 
 use super::prior::Prior;
 
@@ -10,8 +10,8 @@ pub struct Settings {
     pub gyro_noise: f64,
     /// Random walk of its bias, rad/s/sqrt(s).
     pub bias_walk: f64,
-    /// How much its bias may change when the vertical moves through the body by 1, as when gravity changes by 1 g
-    /// along an axis, rad/s: proof masses have weight.
+    /// Sensitivity of the bias to the specific force, per 1 g along
+    /// an axis, rad/s: proof masses have weight.
     pub bias_by_tilt: f64,
     /// Noise in proportion to the rate: what three scales and three angles do not describe.
     pub rate_noise: f64,
@@ -24,7 +24,7 @@ pub struct Settings {
     pub cross_prior: f64,
     /// Prior sigma of the accelerometer's bias, m/s^2.
     pub force_bias_prior: f64,
-    /// Its random walk, m/s^2/sqrt(s).
+    /// Random walk of the bias, m/s^2/sqrt(s).
     pub force_bias_walk: f64,
     /// Prior sigma of the accelerometer's lead, s.
     pub lead_prior: f64,
@@ -36,7 +36,7 @@ pub struct Settings {
     pub heading_start: f64,
     /// The motion: `a = -2 damping frequency v - frequency^2 p + white`, rad/s.
     pub motion_frequency: f64,
-    /// Its damping.
+    /// Damping of the motion.
     pub motion_damping: f64,
     /// Wander of the velocity reference, m/s/sqrt(s).
     pub velocity_walk: f64,
@@ -48,7 +48,7 @@ pub struct Settings {
     pub level_sigma: f64,
     /// Floor of the power density of accelerations, m^2/s^3.
     pub force_floor: f64,
-    /// Its start.
+    /// Sigma of the force's error at the start.
     pub force_start: f64,
     /// Time over which it is averaged, s.
     pub force_secs: f64,
@@ -56,14 +56,14 @@ pub struct Settings {
     pub force_instant: f64,
     /// Share of the vertical residual.
     pub force_vertical: f64,
-    /// How strongly residuals that resemble the ones before them are believed less; 0: not at all, 1: as for a
+    /// Discount of residuals that resemble the ones before them; 0: none, 1: as for a
     /// process of first order.
     pub colour: f64,
     /// Time between corrections, s.
     pub update_secs: f64,
-    /// How long all must be quiet to be at rest, s.
+    /// Time for which all must be quiet to be at rest, s.
     pub rest_secs: f64,
-    /// What was measured at rest counts once the body has rested on for so long, s: a motion that sets in slowly
+    /// Time for which the body must rest on before what was measured counts, s: a motion that sets in slowly
     /// is quiet at first, and what the gyro reads of it is no bias.
     pub rest_lag: f64,
     /// Largest deviation of the rate at rest, rad/s.
@@ -91,7 +91,7 @@ pub struct Settings {
     pub field_noise: f64,
     /// Disturbance of the field's heading: sigma, rad.
     pub field_sigma: f64,
-    /// Its correlation time, s.
+    /// Correlation time of the field's disturbance, s.
     pub field_secs: f64,
     /// Weight of a deviation of the field's norm or dip.
     pub field_gate: f64,
@@ -101,7 +101,7 @@ pub struct Settings {
     pub field_same: f64,
     /// Time over which the field's norm and dip are averaged, s.
     pub field_mean_secs: f64,
-    /// After so many seconds another field is accepted.
+    /// Time after which another field is accepted, s.
     pub field_new_secs: f64,
     /// Prior sigma of hard iron, as a share of the first field: for a magnetometer nobody has calibrated. 0: none is
     /// looked for.
@@ -110,15 +110,15 @@ pub struct Settings {
     pub jerk: f64,
     /// Steps longer than so many ordinary ones are gaps.
     pub gap_factor: f64,
-    /// In gaps beyond this nothing is known, s.
+    /// Length of a gap beyond which nothing is known, s.
     pub gap_secs: f64,
     /// The gyro's range, rad/s; at it, the turn is unknown. 0: not known.
     pub gyro_range: f64,
     /// Delay of the sensor's own filters that nobody has taken out, s.
     pub delay: f64,
-    /// Between the axes of the sensor and of its case, rad.
+    /// Misalignment of the axes of the sensor and of its case, rad.
     pub case: f64,
-    /// What is known of this very sensor, in place of the priors above.
+    /// Knowledge of this very sensor, instead of the priors above.
     pub prior: Prior,
 }
 

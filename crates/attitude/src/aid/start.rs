@@ -1,4 +1,4 @@
-//! How the filter begins, and begins anew. Pure.
+//! Start of the filter, and its restart. Pure.
 
 use super::calibration::Applied;
 use super::covariance::{BIAS, FIELD, HEADING, POSITION, TILT, VELOCITY};
@@ -20,7 +20,7 @@ pub(super) const POSITION_START: f64 = 1e-4;
 const HEADING_UNKNOWN: f64 = 3.0;
 /// Sigma of a tilt that nothing has told, rad.
 const TILT_UNKNOWN: f64 = 1.5;
-/// What may be wrong with a bias after a reset, rad/s.
+/// Error that a bias may have after a reset, rad/s.
 const BIAS_AFTER_RESET: f64 = 8.7e-4;
 
 impl Filter {
@@ -77,7 +77,8 @@ impl Filter {
         }
     }
 
-    /// What levelled was no specific force: nothing is known of the tilt but what the gyro says of its changes.
+    /// Gives gravity up: what levelled was no specific force, and nothing is known of the tilt but what the gyro says
+    /// of its changes.
     pub(super) fn give_gravity_up(&mut self) {
         for axis in [TILT, TILT + 1] {
             self.covariance.restart(axis, TILT_UNKNOWN * TILT_UNKNOWN);
@@ -86,7 +87,7 @@ impl Filter {
         self.rest.interrupt();
     }
 
-    /// What a new start keeps: the calibration, known a little less.
+    /// Resets, and keeps the calibration, known a little less.
     pub(crate) fn reset(&mut self) {
         self.begin_anew();
         for axis in 0..3 {

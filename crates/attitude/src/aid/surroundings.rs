@@ -29,7 +29,7 @@ impl Field {
     }
 }
 
-/// What the field has been like.
+/// History of the field.
 #[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Surroundings {
@@ -40,7 +40,7 @@ pub(super) struct Surroundings {
     pub(super) other_secs: f64,
     /// Mean square deviation from the reference.
     pub(super) deviation: f64,
-    /// For how long a good field has said another heading, s.
+    /// Time for which a good field has shown another heading, s.
     pub(super) contradicted: f64,
     /// Mean norm of what is left of the field without hard iron; 0 before the first.
     pub(super) mean_norm: f64,

@@ -1,4 +1,4 @@
-//! What a tenth of a second says: covariance on, measurements, correction. Pure.
+//! Update every tenth of a second: covariance on, measurements, correction. Pure.
 
 use super::calibration::Applied;
 use super::covariance::{

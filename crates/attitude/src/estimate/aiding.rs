@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 /// Lengths of a force in g and in m/s^2.
 const IN_G: std::ops::Range<f64> = 0.4..4.0;
 const IN_SI: std::ops::RangeInclusive<f64> = 4.0..=40.0;
-/// How far the mean of the first second may be from gravity, as a share.
+/// Largest deviation of the first second's mean from gravity, as a share.
 const FAR: f64 = 0.15;
 /// A mean shorter than this share of gravity is that of accelerations without it.
 const WITHOUT_GRAVITY: f64 = 0.5;
@@ -30,44 +30,44 @@ const LEAST_SECS: f64 = 0.2;
 /// Of a heading that was given where a field tells it too, rad.
 const HEADING_GIVEN: f64 = 0.5;
 
-/// What a bias changes by when gravity changes by 1 g along an axis, as a share of what it is after switching on: 0.1 deg/s
+/// Sensitivity of a bias to gravity, per 1 g along an axis, as a share of the turn-on bias: 0.1 deg/s
 /// of 1 (BMI088), 0.009 of 0.14 (ADIS16465), 1 deg/h of 10 (STIM300), by their data sheets.
 const BY_TILT: f64 = 0.1;
 
 /// Why gravity can not be used.
 enum Unaided {
-    /// There is no specific force.
+    /// Lack of a specific force.
     NoForce,
-    /// There is something else: in words.
+    /// Vector that is something else: in words.
     Implausible(String),
 }
 
-/// Where specific forces come from.
+/// Origin of specific forces.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Forces {
-    /// With the gyro samples.
+    /// Samples of the gyro.
     WithRates,
-    /// In messages of their own.
+    /// Messages of their own.
     Beside,
-    /// None has come: the first decides.
+    /// Undecided: none has come, and the first decides.
     Unseen,
 }
 
-/// What corrects the attitude.
+/// Aiding: what corrects the attitude.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Aiding {
-    /// Of the filter.
+    /// Settings of the filter.
     pub settings: Settings,
-    /// What is known of the initial attitude.
+    /// Knowledge of the initial attitude.
     pub start: Start,
     /// Multiplies the recorded force, beside what its format states.
     pub force_scale: f64,
-    /// Where it comes from.
+    /// Origin of the forces.
     pub forces: Forces,
 }
 
 impl Aiding {
-    /// What corrects, as `--aid` calls it.
+    /// Name in `--aid`.
     #[must_use]
     pub fn name(&self) -> &'static str {
         if self.settings.has_field {
@@ -77,7 +77,7 @@ impl Aiding {
         }
     }
 
-    /// What `plan` asks for, with the first samples of the stream: all there are within a second or so; of a
+    /// Aiding that `plan` asks for, with the first samples of the stream: all there are within a second or so; of a
     /// live stream the first alone, whose mean says nothing yet. What is to be said is added to `warnings`.
     ///
     /// # Errors
@@ -291,7 +291,7 @@ fn of_class(settings: &mut Settings, class: &Noise) {
     }
 }
 
-/// What is known of an initial attitude.
+/// Knowledge of an initial attitude.
 pub(super) fn start(initial: Initial, has_field: bool) -> Start {
     // By a field the heading is that of north, and what was given may be another.
     let heading = if has_field { HEADING_GIVEN } else { 0.0 };

@@ -15,14 +15,14 @@ use crate::quaternion::Quaternion;
 use crate::record::RawSample;
 use crate::setting::AID;
 
-/// What a stream that goes on begins anew with.
+/// Attitude with which a stream that goes on begins again.
 #[derive(Clone, Debug)]
 pub struct Anew {
     /// q_nb at the next sample, ENU (or start) and FLU.
     pub attitude: Quaternion<Nav, Body>,
-    /// What is known of it.
+    /// Knowledge of it.
     pub start: Start,
-    /// Where it came from.
+    /// Origin.
     pub origin: String,
 }
 

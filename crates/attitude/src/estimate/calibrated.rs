@@ -12,7 +12,7 @@ use crate::aid::{Filter, Prior, Settings};
 use crate::smooth::{Beforehand, Learned, OBSERVED, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-/// What the bias of a chip may become while it is switched off, rad/s (0.3 deg/s): ten degrees of temperature do that. A
+/// Change of a chip's bias while it is switched off, rad/s (0.3 deg/s): ten degrees of temperature do that. A
 /// sensor whose class has less of it after switching on has no more than that.
 const SWITCHED_OFF: f64 = 5e-3;
 
@@ -40,7 +40,7 @@ fn about(terms: impl Iterator<Item = (f64, Option<f64>)>) -> Option<f64> {
     Some(square.sqrt())
 }
 
-/// Of sigmas those that say more than was known before: the others are of numbers that were not observed.
+/// Sigmas that state more than was known before: the others are of numbers that were not observed.
 fn observed<const N: usize>(sigma: [f64; N], prior: [f64; N]) -> [f64; N] {
     std::array::from_fn(|i| match sigma[i] <= OBSERVED * prior[i] {
         true => sigma[i],
@@ -74,7 +74,7 @@ fn scale_sigmas(gyro: Option<&Known<9>>, settings: &Settings) -> [f64; 6] {
 }
 
 impl Meaning {
-    /// What a filter of `settings` is told of a sensor whose calibration was taken out of the samples: the bias only
+    /// Prior for a filter of `settings` of a sensor whose calibration was taken out of the samples: the bias only
     /// where that is the calibration's.
     pub(super) fn prior(&self, settings: &Settings, is_bias_calibrated: bool) -> Prior {
         let Some(calibration) = &self.calibration else {
@@ -112,7 +112,7 @@ impl Meaning {
         }
     }
 
-    /// What a smoother is told of it: one standard deviation of each number in body axes, where all are known that it
+    /// Prior for a smoother: one standard deviation of each number in body axes, where all are known that it
     /// is made of there. Hard iron is not among them: a smoother knows it to a microtesla, whatever was taken out.
     pub(super) fn beforehand(&self) -> Beforehand {
         let Some(calibration) = &self.calibration else {
@@ -162,7 +162,7 @@ impl Meaning {
     }
 }
 
-/// What is known of the sensor at the end of a run: what it was known by before, with what the filter has learned.
+/// Calibration of the sensor at the end of a run: what it was known by before, with what the filter has learned.
 /// Numbers that the run has told nothing of stay as they were.
 ///
 /// Of a `recording` that was smoothed, that says more than the filter that ran along.
@@ -266,7 +266,7 @@ pub fn learned(
     known
 }
 
-/// What a whole recording says of the sensor.
+/// Calibration that a whole recording gives.
 fn by_smoother(
     known: &mut SensorCalibration,
     (resolved, prepared): (&Meaning, &Prepared),

@@ -36,7 +36,7 @@ pub struct Estimator {
     asked: Asked,
     /// Vectors that came between the rates, each before the rate of this number.
     beside: Vec<(usize, Nanos, Beside)>,
-    /// How what comes beside the rates is understood; `None` where nothing of it is used.
+    /// Auxiliary inputs; `None` where nothing of them is used.
     besides: Option<Besides>,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
@@ -48,7 +48,7 @@ pub struct Estimator {
     out: Vec<AttitudeSample>,
 }
 
-/// What is taken beside the rates.
+/// Auxiliary inputs: what is taken beside the rates.
 #[derive(Debug)]
 struct Besides {
     resolved: Meaning,
@@ -59,7 +59,7 @@ struct Besides {
     force_scale: Option<f64>,
 }
 
-/// What an estimator knows at one moment: a few kilobytes of text.
+/// State of an estimator at one moment: a few kilobytes of text.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory {
@@ -106,7 +106,7 @@ impl Memory {
 }
 
 impl Estimator {
-    /// For samples understood as `resolved`, from what `prepared` says.
+    /// Makes one for samples understood as `resolved`, from what `prepared` states.
     ///
     /// The method without latency takes them as [`Estimator::live`] does, in a replay, too: what it gives
     /// is what a daemon would have said.
@@ -246,7 +246,7 @@ impl Estimator {
         self.integrator.resume(&last)
     }
 
-    /// What it knows, for another estimator to go on exactly; `None` where there is nothing yet, and
+    /// State, for another estimator to go on exactly; `None` where there is nothing yet, and
     /// where stamps are regularised, which is not kept.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
@@ -391,13 +391,13 @@ impl Estimator {
         self.out.shrink_to(FEW);
     }
 
-    /// What a recording that is smoothed needs beyond some hundred megabytes is kept in `spool`: for
+    /// Keeps in `spool` what a recording that is smoothed needs beyond some hundred megabytes: for
     /// [`Estimator::finish_into`], before the first sample.
     pub fn spool_to(&mut self, spool: Box<dyn Spool>) {
         self.integrator.spool_to(spool);
     }
 
-    /// No more samples: the rest of the attitudes, at once.
+    /// Ends it: returns the rest of the attitudes, at once.
     pub fn finish(&mut self, exec: &impl Executor) -> Vec<AttitudeSample> {
         let mut all = Vec::new();
         let done = self.finish_into(exec, |attitudes| {
@@ -408,7 +408,7 @@ impl Estimator {
         all
     }
 
-    /// No more samples: gives the rest of the attitudes to `take`, in pieces; of a recording that is smoothed these are
+    /// Ends it: gives the rest of the attitudes to `take`, in pieces; of a recording that is smoothed these are
     /// all.
     ///
     /// # Errors
@@ -475,32 +475,32 @@ impl Estimator {
         self.rates.clear();
     }
 
-    /// What conditioning did.
+    /// Report of conditioning.
     #[must_use]
     pub fn conditioning(&self) -> &condition::Report {
         self.conditioner.report()
     }
 
-    /// What became of the stamps, where they were regularised: whether causally, and how.
+    /// Report of the stamps, if they were regularised: whether causally, and how.
     #[must_use]
     pub fn regularising(&self) -> Option<(bool, regularise::Report)> {
         let regulariser = self.regulariser.as_ref()?;
         Some((regulariser.is_causal(), regulariser.report()))
     }
 
-    /// What propagation did.
+    /// Report of propagation.
     #[must_use]
     pub fn propagation(&self) -> propagate::Report {
         self.integrator.propagation()
     }
 
-    /// What corrects the attitude, where something does; beside a smoother, what runs along with it.
+    /// Filter that corrects the attitude, if there is one; beside a smoother, the one that runs along with it.
     #[must_use]
     pub fn filter(&self) -> Option<&aid::Filter> {
         self.integrator.filter()
     }
 
-    /// What a smoother made of the recording, once it is finished; `None` where nobody asked for one.
+    /// Result of a smoother, once it is finished; `None` where nobody asked for one.
     ///
     /// # Errors
     /// In words: why it made nothing of it. The attitudes are the filter's then, to the bit.
@@ -514,7 +514,7 @@ impl Estimator {
         self.integrator.keep_innovations();
     }
 
-    /// Those kept since this was asked last, each with the stamp of the correction.
+    /// Takes the innovations kept since the last call, each with the stamp of the correction.
     pub fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
         self.integrator.innovations()
     }
@@ -526,10 +526,10 @@ impl Estimator {
     }
 }
 
-/// How attitudes are asked for: in which world, of which instant.
+/// Output frame of attitudes: in which world, of which instant.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
-    /// Of the sensor's own filters, s.
+    /// Delay of the sensor's own filters, s.
     delay: f64,
     world: World,
     /// True north to the axes of the filter, whose north is magnetic; `None` = the same.
@@ -537,8 +537,8 @@ struct Asked {
 }
 
 impl Asked {
-    /// From the convention everything is computed in (ENU or start, FLU) to the one asked for: world and body change
-    /// together.
+    /// Converts from the convention everything is computed in (ENU or start, FLU) to the one asked for: world and
+    /// body change together.
     fn apply(&self, out: &mut [AttitudeSample]) {
         let to = self
             .world

@@ -25,7 +25,7 @@ pub struct Conditioned {
 }
 
 impl Conditioned {
-    /// For samples understood as `resolved`.
+    /// Makes one for samples understood as `resolved`.
     #[must_use]
     pub fn new(plan: &Plan, resolved: &Meaning) -> Conditioned {
         Conditioned {
@@ -106,7 +106,7 @@ pub(super) struct RestPass {
 }
 
 impl RestPass {
-    /// For samples understood as `resolved`.
+    /// Makes one for samples understood as `resolved`.
     pub(super) fn new(plan: &Plan, resolved: &Meaning) -> RestPass {
         RestPass {
             conditioned: Conditioned::new(plan, resolved),
@@ -126,7 +126,7 @@ impl RestPass {
         conditioned.push(raw, |sample| detector.push(sample))
     }
 
-    /// What was found.
+    /// Rests that were found.
     ///
     /// # Errors
     /// As [`RestPass::push`].

@@ -66,7 +66,7 @@ impl Integrator {
         }
     }
 
-    /// Where what does not fit in memory goes, of a whole recording.
+    /// Sets the spool for what does not fit in memory of a whole recording.
     pub(super) fn spool_to(&mut self, spool: Box<dyn Spool>) {
         if let Integrator::Smoothed(smoothing) = self {
             smoothing.spool_to(spool);
@@ -160,7 +160,7 @@ impl Integrator {
         }
     }
 
-    /// What corrects, or runs along with the smoother.
+    /// Filter that corrects, or runs along with the smoother.
     fn aided(&self) -> Option<&Aided> {
         match self {
             Integrator::Alone(_) => None,

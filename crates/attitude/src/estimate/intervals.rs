@@ -10,7 +10,7 @@ use crate::record::TimeUnit;
 use crate::record::{RawSample, SampleKind};
 use crate::setting::{FIELD, SAMPLE_KIND, TIME};
 
-/// How far an interval and a step may be apart: samples are lost and stamps jitter, but not by this.
+/// Largest ratio of an interval to a step: samples are lost and stamps jitter, but not by this.
 const MOST: f64 = 3.0;
 /// Fewer intervals than this prove nothing.
 pub const LEAST_INTERVALS: usize = 8;
@@ -24,7 +24,7 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
-    /// What is wrong with the intervals of these samples; `None` where nothing is, or where they play no
+    /// Mismatch of the intervals of these samples; `None` where there is none, or where they play no
     /// part.
     pub(super) fn between(first: &[RawSample], clock: Clock, kind: SampleKind) -> Option<Mismatch> {
         if kind == SampleKind::Rate {

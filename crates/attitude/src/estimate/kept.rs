@@ -1,4 +1,4 @@
-//! What came in, rates and vectors beside them -> the same again, as often as it is asked for.
+//! Samples as they came in, rates and auxiliary vectors -> the same again, as often as it is asked for.
 //!
 //! Apart from the smoother because a recording of ten hours does not fit in memory: what does not is written to a file
 //! that is lent. Every number keeps its bits.
@@ -13,7 +13,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 const IN_MEMORY: u64 = 128 << 20;
 /// Bytes that are read and written at once.
 const PIECE: usize = 1 << 20;
-/// No event is longer.
+/// Longest event.
 const LONGEST: usize = 128;
 
 /// A place for what does not fit in memory: a file of nobody else, written from its beginning.
@@ -49,7 +49,7 @@ pub(super) enum Event {
     Force(Nanos, In<Body>),
     /// Magnetic field.
     Field(Nanos, In<Body>),
-    /// From here on forces come by themselves.
+    /// Mark that forces come by themselves from here on.
     ForcesBeside,
 }
 
@@ -57,7 +57,7 @@ pub(super) enum Event {
 #[derive(Debug)]
 pub(super) struct Kept {
     filling: Vec<u8>,
-    /// In memory, while there are few.
+    /// Pieces in memory, while there are few.
     pieces: Vec<Vec<u8>>,
     /// Lengths of those in the file.
     spooled: Vec<usize>,
@@ -82,7 +82,7 @@ impl Default for Kept {
 }
 
 impl Kept {
-    /// With so many bytes in memory.
+    /// Makes one with so many bytes in memory.
     #[cfg(test)]
     pub(super) fn of_at_most(most: u64) -> Kept {
         Kept {
@@ -167,7 +167,7 @@ const RATE: u8 = 0;
 const FORCE: u8 = 1;
 const FIELD: u8 = 2;
 const FORCES_BESIDE: u8 = 3;
-/// Of a rate: it has a specific force; its interval, and its log time, differ from its stamp; it is an increment.
+/// Flags of a rate: it has a specific force; its interval, and its log time, differ from its stamp; it is an increment.
 const HAS_FORCE: u8 = 1 << 2;
 const HAS_START: u8 = 1 << 3;
 const HAS_LOG: u8 = 1 << 4;
@@ -225,7 +225,7 @@ fn put(vector: &Vector3<f64>, out: &mut Vec<u8>) {
     }
 }
 
-/// What is left of a piece.
+/// Rest of a piece.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {

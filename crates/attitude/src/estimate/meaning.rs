@@ -1,4 +1,4 @@
-//! What is asked for and what the format declares -> what a sample means. Pure.
+//! Settings and declarations of the format -> the meaning of a sample. Pure.
 //!
 //! Apart from the preparation because it needs no sample: what is asked for wins over what is declared.
 
@@ -18,7 +18,7 @@ pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 /// The flags and what the format states, put together: a flag wins.
 #[derive(Clone, Debug)]
 pub struct Meaning {
-    /// What a sample means.
+    /// Kind of a sample.
     pub kind: SampleKind,
     /// A flag or the format says so.
     pub(super) is_kind_stated: bool,
@@ -28,15 +28,15 @@ pub struct Meaning {
     pub body: BodyAxes,
     /// Multiplies the recorded acceleration.
     pub accel_scale: f64,
-    /// Its unit, where the format says.
+    /// Unit, if the format states it.
     pub accel_unit_stated: Option<AccelUnit>,
     /// The convention of recorded orientations.
     pub recorded: Convention,
-    /// Where the samples' own interval lies, and its unit.
+    /// Path of the samples' own interval, and its unit.
     pub interval: Option<(String, TimeUnit)>,
     /// Whether the user stated that unit.
     pub interval_unit_given: bool,
-    /// What is known of the sensor beforehand.
+    /// Calibration of the sensor that is known beforehand.
     pub calibration: Option<Arc<SensorCalibration>>,
     /// Columns of the input to the sensor's axes.
     axes: AxisMap,
@@ -112,7 +112,7 @@ impl Meaning {
         }
     }
 
-    /// What a recorded sample turned in `secs`.
+    /// Angle that a recorded sample turned in `secs`.
     pub(super) fn turned(&self, recorded: [f64; 3], secs: f64) -> DeltaAngle {
         let vector = self.to_body() * Vector3::from(recorded) * self.unit.to_rad();
         match self.kind {

@@ -1,7 +1,7 @@
 //! Figures in the units of data sheets -> the noise of a plan. Pure.
 //!
-//! The same names and units as the errors that are simulated ([`ImuError`](crate::noise::sensor_error::ImuError)): what is read off a
-//! data sheet, or from an Allan deviation, means one thing everywhere.
+//! The same names and units as the errors that are simulated ([`ImuError`](crate::noise::sensor_error::ImuError)):
+//! what is read off a data sheet, or from an Allan deviation, means one thing everywhere.
 
 use super::Noise;
 use crate::diagnostic::Diagnostic;
@@ -13,11 +13,11 @@ const DEG_PER_H: f64 = DEG / 3600.0;
 /// A figure of noise.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct NoiseFigure {
-    /// Its name in a list.
+    /// Name in a list.
     pub key: &'static str,
-    /// Its unit on data sheets.
+    /// Unit on data sheets.
     pub unit: &'static str,
-    /// That unit in SI.
+    /// Size of that unit in SI.
     pub si: f64,
     /// Whether the body axes may differ in it.
     pub by_axis: bool,
@@ -32,8 +32,8 @@ const fn figure(key: &'static str, unit: &'static str, si: f64, by_axis: bool) -
     }
 }
 
-/// What a list of noise may hold. `initial` is of the initial attitude, `tilt` of one that gravity has levelled, and
-/// `scale-ppm` and `misalignment` grow with the angle turned.
+/// Terms that a list of noise may hold. `initial` is of the initial attitude, `tilt` of one that gravity has
+/// levelled, and `scale-ppm` and `misalignment` grow with the angle turned.
 pub const NOISE_FIGURES: [NoiseFigure; 8] = [
     figure("arw", "deg/sqrt(h)", DEG / 60.0, true),
     figure("bias-instability", "deg/h", DEG_PER_H, true),
@@ -46,8 +46,8 @@ pub const NOISE_FIGURES: [NoiseFigure; 8] = [
 ];
 
 impl Noise {
-    /// The noise of these figures, each by its name in [`NOISE_FIGURES`] (`_` does for `-`), about the body axes, in its unit of
-    /// data sheets. What is not given is none.
+    /// The noise of these figures, each by its name in [`NOISE_FIGURES`] (`_` does for `-`), about the body axes, in
+    /// its unit of data sheets. What is not given is none.
     ///
     /// # Errors
     /// A name that is none or is given twice, a number below 0 or not finite, three where there is one, or no `arw`.

@@ -1,4 +1,4 @@
-//! How the samples of a run are to be understood and integrated. Pure.
+//! Settings by which the samples of a run are understood and integrated. Pure.
 //!
 //! Apart from the stages because each of them takes its part of it, and because what can not be is refused
 //! here, before the data are looked at.
@@ -18,10 +18,10 @@ use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
 use std::sync::Arc;
 
-/// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
+/// Bias left in a gyro whose bias was removed, rad/s: what it may have become since.
 pub(super) const BIAS_LEFT: f64 = 1e-3;
 
-/// How the samples of a run are to be understood and integrated: the estimation flags, checked.
+/// Settings by which the samples of a run are understood and integrated: the estimation flags, checked.
 /// `None` = the format decides where it states it, else the default.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -82,7 +82,7 @@ pub struct Plan {
     pub until: Option<f64>,
 }
 
-/// No sensor's own filters take longer, s.
+/// Longest delay of a sensor's own filters, s.
 const LONGEST_DELAY: f64 = 0.1;
 
 /// `--aid`: what corrects the attitude of the gyro.
@@ -107,16 +107,16 @@ pub enum Truncation {
     Unsaid,
     /// Decided by the data of a file.
     Auto,
-    /// It was; the data say in which steps.
+    /// Truncated; the data show in which steps.
     On,
-    /// In these steps, rad/s.
+    /// Truncated in these steps, rad/s.
     Steps(f64),
-    /// They stay.
+    /// Not truncated.
     Off,
 }
 
 impl Default for Plan {
-    /// What the command line's defaults say, but for [`Aid::None`].
+    /// Defaults of the command line, but for [`Aid::None`].
     fn default() -> Plan {
         Plan {
             method: Method::Auto,
@@ -354,7 +354,7 @@ pub enum Initial {
 pub enum Bias {
     /// Nothing is subtracted.
     None,
-    /// From detected rest; refused when there is none.
+    /// Estimate from detected rest; refused when there is none.
     Auto,
     /// Given.
     Given(BodyRate),
@@ -363,7 +363,7 @@ pub enum Bias {
 /// `--noise`: what the covariance is made of. 1 sigma, about the body axes x, y, z.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Noise {
-    /// As named on the command line, for the summary.
+    /// Name on the command line, for the summary.
     pub name: String,
     /// Angle random walk N, rad/sqrt(s).
     pub arw: [f64; 3],
@@ -379,7 +379,7 @@ pub struct Noise {
     pub scale: f64,
     /// Angles between the axes, rad.
     pub misalignment: f64,
-    /// What an attitude levelled by the accelerometer is off by, rad.
+    /// Error of an attitude levelled by the accelerometer, rad.
     pub tilt: f64,
     /// Delay of its filters that nobody has taken out, s.
     pub delay: f64,
@@ -390,7 +390,7 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 /// A named class of gyros, by data sheets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct NoisePreset {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Angle random walk, deg/sqrt(h).
     pub arw: f64,
@@ -412,9 +412,10 @@ pub struct NoisePreset {
 ///
 /// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088: offset 1 deg/s, sensitivity 1 %, cross-axis 1 %, accelerometer
 /// offset 20 mg; `uncalibrated`, a cheap chip on a board that nobody has measured: InvenSense MPU-6050, scale 3 %,
-/// cross-axis 2 %, offset 50 mg, and 1 degree to its case; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %, misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h,
-/// 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm,
-/// 10 arc seconds, 25 ug). Delays: of a chip's default filters; the better the class, the better it is stated and taken out.
+/// cross-axis 2 %, offset 50 mg, and 1 degree to its case; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %,
+/// misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h, 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm,
+/// 10 arc seconds, 25 ug). Delays: of a chip's default filters; the better the class, the better it is stated and
+/// taken out.
 pub const NOISE_PRESETS: [NoisePreset; 5] = [
     NoisePreset {
         name: "consumer",
@@ -468,16 +469,16 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
     },
 ];
 
-/// How far a bias of instability B is off after an hour or so, in B: its flicker has the Allan floor 0.664 B, and
+/// Deviation of a bias of instability B after an hour or so, in B: its flicker has the Allan floor 0.664 B, and
 /// 1.6 to 1.8 B of standard deviation over the decades of time a run has (`docs/theory/attitude.md` 9).
 const FLICKER: f64 = 1.7;
 
-/// What is left of a turn-on bias once it was measured at rest, as a share. Chosen on 14 recordings of BROAD (`docs/estimation.md`):
-/// without it one of them has 80 % of its errors within three sigma, with it every one all.
+/// Share of a turn-on bias that is left once it was measured at rest. Chosen on 14 recordings of BROAD
+/// (`docs/estimation.md`): without it one of them has 80 % of its errors within three sigma, with it every one all.
 const LEFT: f64 = 0.03;
 
 impl Noise {
-    /// Of a class.
+    /// Noise of a class.
     #[must_use]
     pub fn preset(class: &NoisePreset) -> Noise {
         Noise {
@@ -494,7 +495,7 @@ impl Noise {
         }
     }
 
-    /// What is left of a bias that was removed, rad/s: flicker in full, and a share of the turn-on bias, since
+    /// Bias left after removal, rad/s: flicker in full, and a share of the turn-on bias, since
     /// that of a body at rest is not that of one in motion (temperature, acceleration, what drivers cut off).
     #[must_use]
     pub fn unstable_bias(&self) -> [f64; 3] {
@@ -514,7 +515,7 @@ impl Noise {
         self.turn_on_bias.map(|b| LEFT * b)
     }
 
-    /// What is not known of the bias, rad/s, when none is removed: turn-on bias and instability.
+    /// Sigma of the bias, rad/s, when none is removed: turn-on bias and instability.
     #[must_use]
     pub fn unremoved_bias(&self) -> [f64; 3] {
         let [x, y, z] = self.turn_on_bias;
@@ -540,7 +541,7 @@ impl Noise {
         }
     }
 
-    /// What the propagator is told, when `bias` (rad/s) is not known of the bias.
+    /// Noise for the propagator, when `bias` (rad/s) is not known of the bias.
     #[must_use]
     pub fn with_bias(&self, bias: [f64; 3]) -> propagate::Noise {
         propagate::Noise {

@@ -1,4 +1,4 @@
-//! What each of several recordings says of one sensor -> its calibration. Pure.
+//! Calibrations by several recordings of one sensor -> its calibration. Pure.
 //!
 //! Each recording is looked at by itself, and none begins with what another has told: that two of them differ by more
 //! than they claim to know would not be seen otherwise.
@@ -15,13 +15,13 @@ pub struct Pooled {
     /// more than their sigmas, those of the sensor are as much larger. The bias is another each time a sensor is
     /// switched on: its sigma has in it by how much.
     pub calibration: SensorCalibration,
-    /// By how many of their sigmas the recordings differ, root mean square: of the gyro, of the accelerometer, of the
+    /// Disagreement of the recordings in their sigmas, root mean square: of the gyro, of the accelerometer, of the
     /// magnetometer. `None`: too few numbers were told by more than one.
     pub disagreement: [Option<f64>; 3],
 }
 
 impl Pooled {
-    /// Of `recordings` of one sensor. What they call it, when and where from is that of the last.
+    /// Pools `recordings` of one sensor. What they call it, when and where from is that of the last.
     #[must_use]
     pub fn of(recordings: &[SensorCalibration]) -> Pooled {
         let Some(last) = recordings.last() else {
@@ -61,12 +61,12 @@ impl Pooled {
     }
 }
 
-/// How numbers lie about their means.
+/// Scatter of numbers about their means.
 #[derive(Clone, Copy, Default, Debug)]
 struct Scatter {
     /// Squares of what they are off, in sigmas.
     squares: f64,
-    /// How many of them are free.
+    /// Degrees of freedom.
     numbers: u32,
 }
 

@@ -28,30 +28,30 @@ use nalgebra::Vector3;
 const MANY: usize = 200_000;
 const REST_SECS: f64 = 60.0;
 
-/// What was decided before the first sample was integrated.
+/// Decisions made before the first sample was integrated.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// The clock.
     pub clock: Clock,
     /// Bias removed.
     pub bias: BodyRate,
-    /// Its uncertainty, rad/s.
+    /// Sigma of the bias, rad/s.
     pub bias_sigma: Vector3<f64>,
-    /// Where it came from.
+    /// Origin of the bias.
     pub bias_origin: String,
     /// q_nb at the first sample, ENU (or start) and FLU.
     pub initial: Quaternion<Nav, Body>,
-    /// Where it came from.
+    /// Origin of the initial attitude.
     pub initial_origin: String,
-    /// Of `--init gravity`: how well the rest at the start tells the vertical, rad.
+    /// Sigma of the vertical by the rest at the start, of `--init gravity`, rad.
     pub tilt_sigma: f64,
     /// w_ie in ENU, rad/s; zero where the Earth is not taken out.
     pub world_rate: In<Nav>,
     /// The world of the output.
     pub world: World,
-    /// What becomes of the stamps.
+    /// Treatment of the stamps.
     pub stamps: Stamps,
-    /// What corrects the attitude, where something does.
+    /// Aiding, if something corrects the attitude.
     pub aiding: Option<Aiding>,
     /// Step in which the driver cut the rates, rad/s, where that is undone.
     pub truncation_step: Option<f64>,
@@ -59,12 +59,12 @@ pub struct Prepared {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// How long rest is sought.
+/// Time for which rest is sought.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Patience {
-    /// To the end: the log can be read twice.
+    /// Whole log: it can be read twice.
     WholeLog,
-    /// In the first minute: what comes can not be read again, and waits meanwhile.
+    /// First minute: what comes cannot be read again, and waits meanwhile.
     FirstMinute,
 }
 
@@ -86,7 +86,7 @@ pub struct Preparation {
 }
 
 impl Preparation {
-    /// For samples understood as `resolved`.
+    /// Makes one for samples understood as `resolved`.
     #[must_use]
     pub fn new(plan: &Plan, resolved: &Meaning, patience: Patience) -> Preparation {
         Preparation {
@@ -273,7 +273,8 @@ impl Preparation {
     }
 }
 
-/// What only rest tells, as the beginning of what a filter learns: level by the first specific force, no bias.
+/// Settings with what only rest tells, as the beginning of what a filter learns: level by the first specific force,
+/// no bias.
 pub(super) fn learned_on_the_way(plan: &Plan) -> Plan {
     Plan {
         initial: match plan.initial {
@@ -591,7 +592,7 @@ pub(super) fn decide_initial(
 #[derive(Clone, Copy, Debug)]
 struct Earth {
     latitude: f64,
-    /// In ENU, where everything is computed.
+    /// Rate of the Earth in ENU, in which everything is computed.
     w_ie: In<Nav>,
 }
 
@@ -608,7 +609,7 @@ impl Earth {
         *(q_nb.to_dcm().transpose() * self.w_ie).as_vector()
     }
 
-    /// What it means that nobody said where the body heads.
+    /// Warning that nobody stated where the body heads.
     fn heading_warning(self, initial: Initial) -> Option<Diagnostic> {
         let why = match initial {
             Initial::Gravity => format!("{INIT} gravity knows no heading, 0 was taken"),

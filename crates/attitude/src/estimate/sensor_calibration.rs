@@ -1,4 +1,4 @@
-//! What is known of one sensor beforehand, or was learned of it. Pure.
+//! Calibration of one sensor that is known beforehand, or was learned. Pure.
 //!
 //! Apart from what the filter knows ([`crate::aid::Calibration`]) because it outlives a run and a mounting: sensor
 //! axes as recorded, everything that was taken out before, and how well each number is known.
@@ -75,11 +75,11 @@ impl<const N: usize> Known<N> {
 /// ```
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct SensorCalibration {
-    /// What the sensor is called.
+    /// Name of the sensor.
     pub sensor: Option<String>,
-    /// When the last sample was measured that it comes from.
+    /// Time of the last sample that it comes from.
     pub date: Option<String>,
-    /// What it comes from, by name.
+    /// Names of the recordings that it comes from.
     pub sources: Vec<String>,
     /// Gyro bias, rad/s.
     pub bias: Option<Known<3>>,
@@ -132,7 +132,7 @@ impl SensorCalibration {
         Ok(())
     }
 
-    /// What is to be said where it is taken for a sensor of another name.
+    /// Warning that it is taken for a sensor of another name.
     #[must_use]
     pub fn mismatch(&self, name: &str) -> Option<String> {
         let own = self.sensor.as_deref().filter(|own| *own != name)?;

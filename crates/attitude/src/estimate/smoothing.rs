@@ -19,27 +19,27 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::num::NonZero;
 
-/// Between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
+/// Time put between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
 const APART: i64 = 10_000_000_000;
 
-/// Steps no longer than this, ns, hardly tell a rate at its stamp from a mean since the one before; sensors' own filters
-/// make them late by more than half a step.
+/// Steps no longer than this, ns, hardly tell a rate at its stamp from a mean since the one before; sensors' own
+/// filters make them late by more than half a step.
 const SHORT: i64 = 5_000_000;
 /// Steps that are looked at.
 const FEW: usize = 4096;
 /// Samples that are handed on at once.
 const CHUNK: usize = 4096;
 
-/// What was said of a recording beforehand.
+/// Inputs of a smoother about a recording.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Told {
-    /// What a sample means.
+    /// Kind of a sample.
     pub(super) kind: SampleKind,
     /// Somebody said so.
     pub(super) is_kind_stated: bool,
     /// Heading of the first attitude, rad; `None`: that of the smoother.
     pub(super) heading: Option<f64>,
-    /// How many times as far off as sensors of the default class this one may be.
+    /// Ratio of this sensor's errors to those of the default class.
     pub(super) looseness: Looseness,
     /// Standard deviation of the gyro's bias in its class, rad/s.
     pub(super) bias_sigma: f64,
@@ -68,15 +68,16 @@ pub(super) struct Smoothing {
 /// A recording that was smoothed.
 #[derive(Debug)]
 pub struct Recording {
-    /// What was made of it; never [`Outcome::Filter`].
+    /// Result; never [`Outcome::Filter`].
     pub smoothed: Smoothed,
     /// Nobody said what a sample means, and in steps of 5 ms and less they were taken as means since the one before.
     pub is_taken_as_mean: bool,
-    /// The sensor is farther off than those of its class, and was smoothed again with the priors of one that nobody calibrated.
+    /// The sensor is farther off than those of its class, and was smoothed again with the priors of one that nobody
+    /// calibrated.
     pub is_beyond_class: bool,
     /// Bytes of it that were kept in a temporary file.
     pub spooled_bytes: u64,
-    /// How large forces at rest and fields were, as measured and as calibrated.
+    /// Sizes of forces at rest and of fields, as measured and as calibrated.
     pub sizes: Vec<Sizes>,
 }
 
@@ -92,7 +93,7 @@ const LOOSER: Looseness = Looseness {
     axes: 6.0,
     force: 9.8,
 };
-/// So many times as wide is what a calibration file says.
+/// Factor by which the sigmas of a calibration file are widened.
 const LOOSER_KNOWN: f64 = 2.5;
 
 fn is_beyond(smoothed: &Smoothed, looseness: Looseness) -> bool {
@@ -123,7 +124,7 @@ fn is_off<const N: usize>(learned: &Learned<N>) -> bool {
     })
 }
 
-/// What was kept, as the smoother reads it.
+/// Kept samples, as the smoother reads them.
 struct Reading<'a> {
     kept: &'a mut Kept,
     has_forces_beside: bool,
@@ -184,7 +185,7 @@ impl Samples for Reading<'_> {
 }
 
 impl Smoothing {
-    /// Of a filter that has taken nothing yet.
+    /// Makes one of a filter that has taken nothing yet.
     pub(super) fn new(aided: Aided, told: Told) -> Smoothing {
         Smoothing {
             fresh: aided.clone(),
@@ -197,7 +198,7 @@ impl Smoothing {
         }
     }
 
-    /// What does not fit in memory goes there.
+    /// Sets the spool for what does not fit in memory.
     pub(super) fn spool_to(&mut self, spool: Box<dyn Spool>) {
         self.kept.spool_to(spool);
     }
@@ -207,7 +208,7 @@ impl Smoothing {
         &self.aided
     }
 
-    /// What was made of it, once the end has come.
+    /// Result, once the end has come.
     pub(super) fn result(&self) -> Option<Result<&Recording, &Diagnostic>> {
         Some(self.result.as_ref()?.as_ref())
     }
@@ -266,7 +267,7 @@ impl Smoothing {
         Ok(())
     }
 
-    /// As it is without a smoother.
+    /// Attitudes as they are without a smoother.
     fn filter_again(
         &mut self,
         out: &mut Vec<AttitudeSample>,
@@ -306,7 +307,7 @@ impl Smoothing {
         steps.get(steps.len() / 2).copied()
     }
 
-    /// What was made of it, or in words why nothing.
+    /// Smooths it.
     ///
     /// # Errors
     /// It can not be smoothed at all.
@@ -444,7 +445,7 @@ mod tests {
         taken_by(smoothing, is_smooth, Vector3::zeros());
     }
 
-    /// By an accelerometer that is off by `bias`.
+    /// Accounts for an accelerometer that is off by `bias`.
     fn taken_by(smoothing: &mut Smoothing, is_smooth: bool, bias: Vector3<f64>) {
         let mut q = Quaternion::<Nav, Body>::identity();
         for i in 0..SAMPLES {

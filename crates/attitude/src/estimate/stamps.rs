@@ -12,21 +12,21 @@ use crate::record::{RawSample, SampleKind};
 use crate::setting::REGULARISE_STAMPS;
 use std::sync::Arc;
 
-/// What becomes of the stamps.
+/// Treatment of the stamps.
 #[derive(Clone, Debug, Default)]
 pub enum Stamps {
-    /// They stay.
+    /// Stamps as recorded.
     #[default]
     AsRecorded,
-    /// They go onto the lines laid through all of them before, for each meaning a sample is given (that
+    /// Stamps on the lines laid through all of them before, for each meaning a sample is given (that
     /// decides which samples there are).
     OnLines {
-        /// By the meaning.
+        /// Lines by the meaning.
         lines: Vec<(SampleKind, Arc<Lines>)>,
         /// Whether the messages state how long they integrated.
         states_interval: bool,
     },
-    /// They are filtered as they come.
+    /// Stamps filtered as they come.
     Causal {
         /// Whether the messages state how long they integrated.
         states_interval: bool,
@@ -61,7 +61,7 @@ impl Stamps {
         }
     }
 
-    /// For the output's metadata; `None` where they stay.
+    /// Words for the output's metadata; `None` for stamps as recorded.
     #[must_use]
     pub fn words(&self, kind: SampleKind) -> Option<String> {
         match self {
@@ -92,7 +92,7 @@ pub struct StampPass {
 }
 
 impl StampPass {
-    /// For samples understood as `meaning`, and as each of `others` they are compared under; `None` where
+    /// Makes one for samples understood as `meaning`, and as each of `others` they are compared under; `None` where
     /// the plan leaves stamps as they are.
     #[must_use]
     pub fn new(

@@ -19,7 +19,7 @@ pub(super) const FIELD: usize = 28;
 pub(super) const NORTH: usize = 37;
 pub(super) const FIELD_TIME: usize = 39;
 pub(super) const MOVING: usize = 40;
-/// How many there are, and without a magnetometer.
+/// Number of unknowns, and without a magnetometer.
 pub(super) const ALL: usize = 43;
 pub(super) const PLAIN: usize = 25;
 /// Width of the border's equations: right sides are one more column.
@@ -57,7 +57,7 @@ const FORCE_SHARED: f64 = 0.05;
 pub(super) const IRON_SCALE: f64 = 1.0;
 
 impl Priors {
-    /// For a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
+    /// Makes it for a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
     pub(super) fn new(settings: &Settings, has_moving_field: bool) -> Priors {
         let Looseness { scale, axes, force } = settings.looseness;
         let mut sigma = [0.0; ALL];

@@ -18,7 +18,8 @@ pub(super) fn doubt(before: &Numbers, after: &Numbers, secs: f64) -> [f64; 2] {
     [turn * turn, push * push]
 }
 
-/// What the mean of a step misses of what a sample misses of the cubic through its four neighbours, a sixth of a fourth
+/// Error of the mean of a step, as a share of a sample's deviation from the cubic through its four neighbours, a
+/// sixth of a fourth
 /// difference. Of the rate: 11/720 of such a difference, which the trapezoid with its next correction leaves (Gregory).
 /// Of the force all of it: what is faster than the samples shakes the sensor in its case, too.
 const MISSED: [f64; 2] = [0.09, 1.0];

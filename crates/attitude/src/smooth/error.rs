@@ -10,16 +10,16 @@ pub enum SmoothError<E> {
     Read(E),
     /// Fewer than two samples could be used, of so many; `forceless` had no specific force.
     TooFew {
-        /// That came.
+        /// Number of samples that came.
         samples: u64,
-        /// Without a force.
+        /// Number without a force.
         forceless: u64,
     },
     /// A setting can not be.
     Setting {
-        /// Which.
+        /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
     },
 }

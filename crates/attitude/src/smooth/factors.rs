@@ -16,15 +16,16 @@ pub(super) const VELOCITY: usize = 3;
 pub(super) const POSITION: usize = 6;
 pub(super) const BIAS: usize = 9;
 
-/// Noise of the gyro, rad/sqrt(s), of its bias, rad/s/sqrt(s), of the accelerometer with all that is no model, m/s^2/sqrt(Hz).
+/// Noise of the gyro, rad/sqrt(s), of its bias, rad/s/sqrt(s), of the accelerometer with all that is no model,
+/// m/s^2/sqrt(Hz).
 pub(super) const TURN_NOISE: f64 = 0.01_f64.to_radians();
 pub(super) const BIAS_NOISE: f64 = 0.0015_f64.to_radians();
 pub(super) const FORCE_NOISE: f64 = 0.02;
-/// At rest: turn (rad), way (m), velocity (m/s).
+/// Sigmas at rest: rotation (rad), way (m), velocity (m/s).
 const STILL_TURN: f64 = 0.02_f64.to_radians();
 const STILL_WAY: f64 = 0.005;
 const STILL_VELOCITY: f64 = 0.02;
-/// What is known of attitude (rad) and of velocity and position (m/s, m) after a break.
+/// Sigmas of attitude (rad) and of velocity and position (m/s, m) after a break.
 const BROKEN_TURN: f64 = 2.0;
 const BROKEN_WAY: f64 = 100.0;
 
@@ -37,8 +38,8 @@ pub(super) struct Node {
     pub bias: Vector3<f64>,
 }
 
-/// What a segment adds. Of the later node's own block only the diagonal, and position by velocity: a row holds one of
-/// its unknowns, by 1, and at most a velocity beside a position.
+/// Contribution of a segment. Of the later node's own block only the diagonal, and position by velocity: a row holds
+/// one of its unknowns, by 1, and at most a velocity beside a position.
 #[derive(Clone)]
 pub(super) struct Blocks<const W: usize> {
     pub own: [[f64; STATES]; STATES],
@@ -48,7 +49,7 @@ pub(super) struct Blocks<const W: usize> {
     /// Velocity by position of the same axis.
     pub next_across: [f64; 3],
     pub next_border: [[f64; W]; STATES],
-    /// Of the field, uT^2; 0 without.
+    /// Residual of the field, uT^2; 0 without.
     pub field_residual: f64,
 }
 
@@ -72,9 +73,9 @@ pub(super) struct Row<const W: usize> {
     pub border: [f64; W],
     pub span: usize,
     pub weight: f64,
-    /// Which unknown of the later node it holds, by 1.
+    /// Index of the unknown of the later node that it holds, by 1.
     pub next: Option<usize>,
-    /// Beside a position: that axis' velocity, and by what.
+    /// Index and factor of that axis' velocity, beside a position.
     pub second: Option<(usize, f64)>,
 }
 

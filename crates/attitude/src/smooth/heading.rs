@@ -14,10 +14,10 @@ use nalgebra::{Rotation3, Vector3};
 const SIGMA: [f64; 2] = [0.3, 10.0];
 /// Residuals as large as this are believed half as much, at rest and while moving, uT.
 const ROBUST: [f64; 2] = [6.0, 8.0];
-/// It is so many times as large at first.
+/// Factor of the limit at first.
 const ROBUST_AT_FIRST: f64 = 16.0;
 
-/// What is believed of the field, by segment.
+/// Trust in the field, by segment.
 pub(super) struct FieldTrust {
     reference: HeadingReference,
     spacing: f64,
@@ -35,7 +35,7 @@ impl FieldTrust {
         }
     }
 
-    /// Before any residual is known.
+    /// Trust before any residual is known.
     pub(super) fn first(&self, segments: &[Segment]) -> Vec<f64> {
         segments
             .iter()
@@ -43,7 +43,7 @@ impl FieldTrust {
             .collect()
     }
 
-    /// After iteration `i` left these squares of residuals, uT^2 (Geman and McClure 1987).
+    /// Trust after iteration `i` left these squares of residuals, uT^2 (Geman and McClure 1987).
     pub(super) fn after(
         &self,
         iteration: usize,

@@ -4,8 +4,8 @@
 //! accelerate away for ever, and how far they go is learned from the log itself.
 //!
 //! Position about its centre is a stationary process of Matern's covariance with `nu` 3/2, each axis by itself:
-//! `s^2 (1 + l t) exp(-l t)`, whose velocity has the variance `(l s)^2` (state and transition: Hartikainen, Sarkka 2010,
-//! section 3.1). Nodes that were each held to the centre by themselves would count one excursion many times.
+//! `s^2 (1 + l t) exp(-l t)`, whose velocity has the variance `(l s)^2` (state and transition: Hartikainen, Sarkka
+//! 2010, section 3.1). Nodes that were each held to the centre by themselves would count one excursion many times.
 
 use super::border;
 use super::factors::{Node, POSITION, Row, STATES, VELOCITY};
@@ -13,7 +13,7 @@ use super::segments::Segment;
 use super::settings::MotionModel;
 use nalgebra::Vector3;
 
-/// So many times the root mean square is the sigma.
+/// Ratio of the sigma to the root mean square.
 const WIDTH: f64 = 3.0;
 /// Never less, m/s and m.
 const LEAST: [f64; 2] = [0.05, 0.02];
@@ -34,17 +34,17 @@ pub(super) struct Bound {
     /// m/s, m.
     pub(super) sigma: [f64; 2],
     weights: Vec<[f64; 2]>,
-    /// Of the process: `l` above, 1/s.
+    /// Pace of the process: `l` above, 1/s.
     pace: f64,
 }
 
-/// From the state of a node, position and velocity, to that of the next: `x' = A x + e`, `e` of variance `Q`.
+/// Transition of the state of a node, position and velocity, to that of the next: `x' = A x + e`, `e` of variance `Q`.
 struct Transition {
     /// `A`.
     by: [[f64; 2]; 2],
     /// Variance of the velocity's part of `e`, and of the position's once that is known.
     variance: [f64; 2],
-    /// What the position's part has of the velocity's, s.
+    /// Part that the position shares with the velocity, s.
     shared: f64,
 }
 
@@ -76,12 +76,13 @@ impl Bound {
         }
     }
 
-    /// Of velocity and position of the process, m/s and m.
+    /// Spread of velocity and position of the process, m/s and m.
     fn spread(&self) -> [f64; 2] {
         [self.pace * self.sigma[1], self.sigma[1]]
     }
 
-    /// Adds what is known of node `k` by itself to its equations: centre among the constants. Returns the weighted square.
+    /// Adds what is known of node `k` by itself to its equations: centre among the constants. Returns the weighted
+    /// square.
     pub(super) fn add<const W: usize>(
         &self,
         (k, node): (usize, &Node),

@@ -18,22 +18,22 @@ use nalgebra::{Matrix3, Vector3};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-/// Of every attitude: what the axes of a case are known to, rad, and what its stamp is, s.
+/// Sigmas of every attitude: of the axes of a case, rad, and of its stamp, s.
 const AXES: f64 = 0.2_f64.to_radians();
 const TIMING: f64 = 0.0025;
 
 /// The attitude at a sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Estimate {
-    /// Of the sample.
+    /// Stamp of the sample.
     pub stamp: Nanos,
     /// Body to earth: east (with a field: magnetic), north, up.
     pub q_nb: Quaternion<Nav, Body>,
-    /// Of the error `q_true = exp(error) q_nb`, rad^2, earth axes.
+    /// Covariance of the error `q_true = exp(error) q_nb`, rad^2, earth axes.
     pub covariance: Matrix3<f64>,
     /// The rate without what is known of the sensor's errors, rad/s, body axes.
     pub rate: Vector3<f64>,
-    /// Which of the sections it belongs to.
+    /// Index of the section it belongs to.
     pub section: usize,
     /// The sample could not be used: it has the attitude of the next instant that has one.
     pub is_filled: bool,
@@ -139,7 +139,7 @@ impl Smoothed {
         Ok(all_sizes)
     }
 
-    /// How large forces and fields of a segment are; `None` of one in motion without a field.
+    /// Sizes of forces and fields of a segment; `None` of one in motion without a field.
     fn sizes(&self, segment: &Segment, held: &[Prepared], sensor: &Sensor) -> Option<Sizes> {
         let mean = |sizes: &mut dyn Iterator<Item = [f64; 2]>| {
             let (mut sum, mut count) = ([0.0; 2], 0.0);

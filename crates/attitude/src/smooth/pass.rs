@@ -24,13 +24,13 @@ const JOB: usize = 8;
 /// Jobs that wait for each thread that helps.
 const WAITING: usize = 2;
 
-/// What a sweep starts from: the same for all its segments.
+/// Model from which a sweep starts: the same for all its segments.
 pub(super) struct Model<'a> {
     pub(super) segments: &'a [Segment],
     pub(super) nodes: &'a [Node],
     pub(super) constants: &'a Constants,
     pub(super) bound: &'a Bound,
-    /// Of the field of each segment, 1/uT^2.
+    /// Weights of the field of each segment, 1/uT^2.
     pub(super) field_weights: &'a [f64],
 }
 
@@ -77,12 +77,12 @@ pub(super) struct Job<const W: usize> {
     samples: Vec<Prepared>,
     ranges: Vec<Range<usize>>,
     pub(super) blocks: Vec<Blocks<W>>,
-    /// What a segment did that is wanted later: mean field (samples and sum), push.
+    /// Results of a segment that are wanted later: mean field (samples and sum), push.
     pub(super) seen: Vec<Seen>,
     pub(super) border: Box<[[f64; W]; W]>,
 }
 
-/// What a segment is remembered for.
+/// Results for which a segment is remembered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     /// Mean field as measured, earth axes, uT; `None` without.
@@ -109,7 +109,7 @@ impl<const W: usize> Job<W> {
         self.ranges.push(start..self.samples.len());
     }
 
-    /// To be filled anew, from segment `first` on.
+    /// Empties it, to be filled again from segment `first` on.
     fn reused(mut self, first: usize) -> Job<W> {
         self.first = first;
         self.samples.clear();
@@ -170,7 +170,7 @@ impl<const W: usize> Queue<W> {
         self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How many wait now.
+    /// Adds a job; returns how many wait now.
     fn push(&self, job: Job<W>) -> usize {
         let mut held = self.held();
         held.0.push_back(job);

@@ -21,7 +21,7 @@ use std::fmt;
 
 /// A heading that nothing tells is held to this, rad.
 const HELD: f64 = 1e-4;
-/// Of the first node, rad, m/s, m: only that there is a solution.
+/// Sigmas of the first node, rad, m/s, m: only so that there is a solution.
 const ANYWHERE: f64 = 1e6;
 /// Largest turn of a node in one iteration, rad.
 const LARGEST_TURN: f64 = 0.5;
@@ -39,21 +39,21 @@ const SETTLED_SHARE: f64 = 0.3;
 /// Time over which a mean force points up, s.
 const UPRIGHT_SECS: f64 = 10.0;
 
-/// What does not change between iterations.
+/// Part that does not change between iterations.
 pub(super) struct Problem<'a> {
     pub(super) survey: &'a Survey,
     pub(super) settings: &'a Settings,
     pub(super) segments: &'a [Segment],
     pub(super) priors: &'a Priors,
     pub(super) trust: &'a FieldTrust,
-    /// Of the gyro's bias beforehand, rad/s.
+    /// Prior of the gyro's bias, rad/s.
     pub(super) bias: Vector3<f64>,
     pub(super) bias_sigma: Vector3<f64>,
     /// The same along the axis that stays vertical, without the field.
     pub(super) along: Option<Along>,
 }
 
-/// What the iterations improve.
+/// State that the iterations improve.
 #[derive(Clone)]
 pub(super) struct State {
     pub(super) nodes: Vec<Node>,
@@ -71,7 +71,7 @@ pub enum Failure {
     NotFinite,
     /// The largest turn of a node grew twice running; the last was this, rad.
     Diverging(f64),
-    /// After the last iteration nodes still turned by this, rad.
+    /// Rotation of the nodes in the last iteration, which was too large, rad.
     Unfinished(f64),
     /// The motion was taken to go this far, m, without a standstill anywhere.
     Strays(f64),
@@ -122,13 +122,13 @@ impl<const W: usize> Phase<W> {
     }
 }
 
-/// How a phase ended.
+/// End of a phase.
 pub(super) struct Phase<const W: usize> {
     /// The equations of the last iteration.
     pub(super) solver: Option<Solver<W>>,
     pub(super) failure: Option<Failure>,
     pub(super) iterations: usize,
-    /// By how much each node turned in the last iteration, earth axes, rad.
+    /// Rotation of each node in the last iteration, earth axes, rad.
     turns: Vec<[f64; 3]>,
     /// Mean fields by segment, of the last iteration.
     pub(super) fields: Vec<Option<[f64; 3]>>,
@@ -368,7 +368,7 @@ fn held_headings(problem: &Problem<'_>, state: &State, has_field: bool) -> Vec<b
     held
 }
 
-/// How far the mean forces of parts of the log are off the vertical: the median, rad; 0 of a short log.
+/// Angle of the mean forces of parts of the log off the vertical: the median, rad; 0 of a short log.
 fn off_vertical(segments: &[Segment], pushes: &[[f64; 3]]) -> f64 {
     let mut angles = Vec::new();
     let (mut secs, mut velocity) = (0.0, Vector3::zeros());

@@ -32,7 +32,7 @@ pub(super) struct Preparer<'a> {
     /// Accepted, a few of them given on already.
     window: Vec<(Numbers, u64)>,
     next: usize,
-    /// For instantaneous samples.
+    /// Interpolation for instantaneous samples.
     between: Option<Catmull>,
     /// Samples that gaps may still be filled with.
     fillers: usize,

@@ -2,26 +2,27 @@
 
 use nalgebra::Vector3;
 
-/// So many samples on both sides of a gap say how the rate goes on.
+/// Number of samples on both sides of a gap that tell how the rate goes on.
 pub(super) const BESIDE: usize = 5;
 /// A sample as the sweep wants it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared {
     pub stamp: i64,
-    /// Since the one before, s.
+    /// Time since the one before, s.
     pub secs: f64,
     /// Mean since the one before, rad/s.
     pub rate: Vector3<f64>,
     pub force: Vector3<f64>,
     /// NaN where none was measured.
     pub field: Vector3<f64>,
-    /// Which one of the input it is, or which one it comes before.
+    /// Index of the one of the input, or of the one it comes before.
     pub input: u64,
     pub is_input: bool,
     /// Nothing is known of the time before it.
     pub is_after_break: bool,
     /// A gap before it was bridged.
     pub is_bridged: bool,
-    /// Variance that a gap before it, and motion faster than the samples, leave of attitude and velocity: rad^2, (m/s)^2.
+    /// Variance that a gap before it, and motion faster than the samples, leave of attitude and velocity: rad^2,
+    /// (m/s)^2.
     pub doubt: [f64; 2],
 }

@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 /// The real-time filter's view.
 pub(super) struct Realtime {
     pub(super) nodes: Vec<[f64; 4]>,
-    /// Of the attitude's error, rad^2, earth axes.
+    /// Covariances of the attitude's error, rad^2, earth axes.
     pub(super) covariances: Vec<Matrix3<f64>>,
     /// Median of its bias over the second half of the log, rad/s, and its sigma at the end.
     pub(super) bias: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! What a recording told: the sensor, the sections, how sure. Pure.
+//! Result of a recording: the sensor, the sections, how sure. Pure.
 
 use super::border::{self, Constants, IRON_SCALE, Priors};
 use super::phase::Failure;
@@ -50,7 +50,7 @@ pub struct Calibration {
     pub force: Learned<9>,
     /// ta of `force + ta rate x force`, s.
     pub force_time: Learned<1>,
-    /// With a field.
+    /// Magnetometer, with a field.
     pub magnetometer: Option<Magnetometer>,
 }
 
@@ -65,7 +65,7 @@ pub struct Magnetometer {
     pub time: Learned<1>,
     /// The field's north and up, uT.
     pub north_up: Learned<2>,
-    /// What is added to it while the body moves: east, north, up, uT.
+    /// Field added while the body moves: east, north, up, uT.
     pub while_moving: Learned<3>,
     /// uT by the unit of the field that came.
     pub scale: f64,
@@ -110,11 +110,11 @@ impl Calibration {
     }
 }
 
-/// How large what was measured between two nodes is, by the sensor and by its calibration. Whatever way is up, a force at
+/// Sizes of what was measured between two nodes, by the sensor and by its calibration. Whatever way is up, a force at
 /// rest and the field should be of one size; how far they are from it is what a calibration is worth.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sizes {
-    /// Of the later node.
+    /// Stamp of the later node.
     pub stamp: Nanos,
     /// Mean size of the specific force, m/s^2, as measured and as calibrated; where the body rests.
     pub force: Option<[f64; 2]>,
@@ -125,7 +125,7 @@ pub struct Sizes {
 /// The gyro's bias at a node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bias {
-    /// Of the node.
+    /// Stamp of the node.
     pub stamp: Nanos,
     /// rad/s, body axes.
     pub value: Vector3<f64>,
@@ -136,7 +136,7 @@ pub struct Bias {
 /// A part of the log without a break.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Section {
-    /// Of its first sample, and of its last.
+    /// Stamps of its first sample, and of its last.
     pub start: Nanos,
     /// The last.
     pub end: Nanos,
@@ -144,7 +144,7 @@ pub struct Section {
     pub has_north: bool,
 }
 
-/// What the attitudes are.
+/// Origin of the attitudes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Outcome {
     /// The smoother's, field included where there is one.
@@ -155,18 +155,19 @@ pub enum Outcome {
     Filter(Failure),
 }
 
-/// What was done to the samples, and what became of them.
+/// Counts of what was done to the samples, and what became of them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Counts {
-    /// That came.
+    /// Number that came.
     pub samples: u64,
-    /// That could not be used: not finite, beyond what there is, not later than those before, without a force near.
+    /// Number that could not be used: not finite, beyond what there is, not later than those before, without a force
+    /// near.
     pub rejected: u64,
-    /// That came without a force: an accelerometer may be slower than the gyro.
+    /// Number that came without a force: an accelerometer may be slower than the gyro.
     pub forceless: u64,
     /// Segments between nodes, and those of them at rest.
     pub segments: u64,
-    /// At rest.
+    /// Number at rest.
     pub standstills: u64,
     /// Gaps that were bridged.
     pub bridged: u64,
@@ -174,6 +175,6 @@ pub struct Counts {
     pub breaks: u64,
     /// Iterations without the field, and with it.
     pub iterations: [u64; 2],
-    /// Of the rates.
+    /// Quantisation of the rates.
     pub quantisation: Option<Quantisation>,
 }

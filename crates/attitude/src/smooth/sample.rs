@@ -1,4 +1,4 @@
-//! What the smoother reads, as often as it needs to. Pure.
+//! Samples that the smoother reads, as often as it needs to. Pure.
 //!
 //! Apart from [`record`](crate::record) because a log of ten hours does not fit in memory: nodes are held, samples
 //! are read again in each pass, from wherever they are.
@@ -47,7 +47,7 @@ impl From<&Sample> for Numbers {
 
 /// Samples that can be read from the beginning, again and again.
 pub trait Samples {
-    /// What can go wrong when they are read.
+    /// Error of reading them.
     type Error;
 
     /// Gives all of them to `take`, in order, in chunks of any size: the same ones each time this is called. The

@@ -19,9 +19,9 @@ const SLACK: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
     pub samples: usize,
-    /// Between its nodes, s.
+    /// Time between its nodes, s.
     pub secs: f64,
-    /// Of its last sample.
+    /// Stamp of its last sample.
     pub stamp: i64,
     /// Nothing is known of the motion.
     pub is_break: bool,
@@ -71,7 +71,7 @@ impl Sums {
         self.doubt[1] += sample.doubt[1];
     }
 
-    /// Of both together (Chan, Golub, LeVeque 1979).
+    /// Sums of both together (Chan, Golub, LeVeque 1979).
     fn with(mut self, later: &Sums) -> Sums {
         let (n, m) = (self.samples as f64, later.samples as f64);
         for what in 0..2 {
@@ -247,7 +247,7 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// Between the two nearest ranks in proportion.
+/// Fifth percentile, between the two nearest ranks in proportion.
 fn fifth_percentile(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let place = 0.05 * (values.len().checked_sub(1)?) as f64;

@@ -1,4 +1,4 @@
-//! What the smoother is told about a recording and how to treat it. Pure.
+//! Settings of the smoother about a recording and how to treat it. Pure.
 
 use nalgebra::Vector3;
 use std::num::NonZero;
@@ -16,7 +16,7 @@ pub enum SampleModel {
     Instant,
 }
 
-/// What of the field counts as north.
+/// Reference of the heading in the field.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum HeadingReference {
     /// The field where the body rests; while it moves the field may be another, and only supports.
@@ -26,7 +26,7 @@ pub enum HeadingReference {
     All,
 }
 
-/// What is taken for the motion of a body that strays no farther and no faster than it is found to.
+/// Model of the motion of a body that strays no farther and no faster than it is found to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum MotionModel {
     /// A stationary process: where it is and how fast bear on where it is next.
@@ -37,7 +37,7 @@ pub enum MotionModel {
     Independent,
 }
 
-/// In what the field is measured.
+/// Unit in which the field is measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum FieldUnit {
     /// uT.
@@ -47,7 +47,7 @@ pub enum FieldUnit {
     Unknown,
 }
 
-/// What is known of a sensor of which a calibration was taken out of the samples already: one standard deviation of
+/// Prior knowledge of a sensor of which a calibration was taken out of the samples already: one standard deviation of
 /// what is left, body axes, matrices row by row. `None`: as of any sensor.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Beforehand {
@@ -55,15 +55,15 @@ pub struct Beforehand {
     pub gyro_bias: [Option<f64>; 3],
     /// Of the gyro's scale and axes.
     pub gyro: [Option<f64>; 9],
-    /// Of the accelerometer's bias, m/s^2.
+    /// Sigma of the accelerometer's bias, m/s^2.
     pub force_bias: [Option<f64>; 3],
-    /// Of its scale and axes.
+    /// Sigmas of its scale and axes.
     pub force: [Option<f64>; 9],
-    /// How long after its stamp a force was measured, s, which is not taken out; and one standard deviation.
+    /// Time after its stamp at which a force was measured, s, which is not taken out; and one standard deviation.
     pub force_time: Option<(f64, f64)>,
-    /// Of the magnetometer's scale and axes.
+    /// Sigmas of the magnetometer's scale and axes.
     pub field: [Option<f64>; 9],
-    /// As `force_time`, of the field.
+    /// Time of the field, as `force_time`.
     pub field_time: Option<(f64, f64)>,
 }
 
@@ -83,14 +83,14 @@ impl Beforehand {
     }
 }
 
-/// How many times as wide as after a calibration in the factory the priors are.
+/// Ratio of the priors to those after a calibration in the factory.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Looseness {
-    /// Of scales, and of when forces and fields are measured.
+    /// Ratio for scales, and for when forces and fields are measured.
     pub scale: f64,
-    /// Of axes, to each other and in the case.
+    /// Ratio for axes, to each other and in the case.
     pub axes: f64,
-    /// Of the accelerometer's bias.
+    /// Ratio for the accelerometer's bias.
     pub force: f64,
 }
 
@@ -126,19 +126,19 @@ pub struct Settings {
     pub gyro_range: f64,
     /// By how much the sigmas of calibration constants are larger than after a calibration in the factory.
     pub looseness: Looseness,
-    /// What is known of this one.
+    /// Prior knowledge of this sensor.
     pub known: Beforehand,
-    /// How late the samples are, s: attitudes are turned on by the rate over this.
+    /// Delay of the samples, s: attitudes are turned on by the rate over this.
     pub sensor_delay: f64,
-    /// What of the field counts as north.
+    /// Reference of the heading in the field.
     pub heading_reference: HeadingReference,
     /// The unit of the field.
     pub field_unit: FieldUnit,
-    /// What a gyro value is the rate of.
+    /// Model of a gyro value.
     pub sample_model: SampleModel,
     /// Whether rates that a driver cut towards zero are put back in the middle of their step.
     pub undo_truncation: bool,
-    /// What is taken for the motion.
+    /// Model of the motion.
     pub motion: MotionModel,
     /// Whether what is faster than the samples counts as noise of them.
     pub has_unresolved: bool,
@@ -173,7 +173,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What can not be: its name and value.
+    /// Setting that cannot be: its name and value.
     pub(super) fn fault(&self) -> Option<(&'static str, f64)> {
         let spacing = self.node_spacing.unwrap_or(0.5);
         let in_range =

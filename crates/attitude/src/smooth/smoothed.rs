@@ -15,9 +15,9 @@ use nalgebra::{Matrix3, Vector3};
 
 /// A heading that may be any: of a uniform distribution, rad.
 pub(super) const ANY_HEADING: f64 = 104.0_f64.to_radians();
-/// Of a heading turned north but not solved with the field, rad.
+/// Sigma of a heading turned north but not solved with the field, rad.
 const TURNED: f64 = 10.0_f64.to_radians();
-/// Without a field the heading's sigma is too small by this.
+/// Factor by which the heading's sigma is too small without a field.
 const WITHOUT_FIELD: f64 = 2.0;
 
 /// A smoothed recording: nodes in memory, attitudes on a further pass ([`Smoothed::attitudes`]).
@@ -39,7 +39,7 @@ pub struct Smoothed {
 }
 
 impl Smoothed {
-    /// What the attitudes are.
+    /// Origin of the attitudes.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         self.outcome

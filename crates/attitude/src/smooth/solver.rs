@@ -30,7 +30,7 @@ pub(super) struct Solution {
     pub(super) border: Vec<f64>,
 }
 
-/// What is left of two blocks of a node: turn (3x3, rad^2), and one variance of each axis of its bias.
+/// Marginal of two blocks of a node: rotation (3x3, rad^2), and one variance of each axis of its bias.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marginal {
     pub(super) turn: Matrix3<f64>,
@@ -42,7 +42,7 @@ const fn at(i: usize, j: usize) -> usize {
 }
 
 impl<const W: usize> Solver<W> {
-    /// For so many nodes; `before` is emptied and its memory taken over.
+    /// Makes one for so many nodes; `before` is emptied and its memory taken over.
     pub(super) fn new(nodes: usize, before: Option<Solver<W>>) -> Solver<W> {
         let mut kept = before.map(|solver| solver.nodes).unwrap_or_default();
         kept.clear();
@@ -297,7 +297,7 @@ fn backward(factor: &[f64; 78], x: &mut [f64; STATES]) {
     }
 }
 
-/// By the border's factor, both ways.
+/// Solves by the border's factor, both ways.
 fn solve_in_place(factor: &[Vec<f64>], x: &mut [f64]) {
     let n = x.len();
     for i in 0..n {

@@ -16,7 +16,7 @@ const RESOLUTION: f64 = 1e-6;
 const LARGEST_STEP: f64 = 0.034_906_585;
 /// And at least so many resolutions.
 const SMALLEST_STEP: usize = 5;
-/// So many samples before and after one tell whether it only passes through zero.
+/// Number of samples before and after one that tell whether it only passes through zero.
 const AROUND: usize = 8;
 /// More different intervals than this are counted in coarser bins.
 const MOST_INTERVALS: usize = 1 << 14;
@@ -32,23 +32,23 @@ pub struct Quantisation {
     pub step: f64,
     /// Width of the bin about zero by the mean width of the six others: 2 where rates were cut, 1 where rounded.
     pub zero_bin: f64,
-    /// So many rates that pass through zero were looked at.
+    /// Number of rates that pass through zero that were looked at.
     pub counted: u64,
     /// Rates were put back in the middle of their step.
     pub is_undone: bool,
 }
 
-/// What the log is like.
+/// Survey of the log.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Survey {
     /// Samples that came, and that can be used.
     pub samples: u64,
     pub accepted: u64,
-    /// That had no specific force.
+    /// Number that had no specific force.
     pub forceless: u64,
     /// Median time between samples, s.
     pub interval: f64,
-    /// From the first to the last without the long breaks, s.
+    /// Time from the first to the last without the long breaks, s.
     pub secs: f64,
     pub quantisation: Option<Quantisation>,
     /// Fields that came.
@@ -98,7 +98,7 @@ impl Survey {
     }
 }
 
-/// Of the first pass.
+/// First pass.
 #[derive(Default)]
 struct First {
     samples: u64,
@@ -254,7 +254,7 @@ impl Sizes {
     }
 }
 
-/// How wide the bin about zero is.
+/// Width of the bin about zero.
 fn zero_bin<S: Samples>(samples: &mut S, step: f64) -> Result<Quantisation, S::Error> {
     let mut window: Vec<Vector3<f64>> = Vec::new();
     let (mut zero, mut others) = (0_u64, 0_u64);

@@ -9,12 +9,12 @@ use super::prepared::Prepared;
 use crate::quaternion::kernel::{rows, turned, unit};
 use nalgebra::{Matrix3, Vector3};
 
-/// What is assumed of gravity, m/s^2.
+/// Gravity that is assumed, m/s^2.
 pub(super) const GRAVITY: f64 = 9.81;
 
 /// Derivatives that a turn has: by bias, by the gyro's matrix.
 pub(super) const TURN: usize = 12;
-/// That velocity and position have: those, by the accelerometer's bias, matrix and time offset.
+/// Number of columns of velocity and position: those, by the accelerometer's bias, matrix and time offset.
 pub(super) const PUSH: usize = 25;
 /// Columns of the accelerometer in the loop, and one for alignment.
 const OWN: usize = 14;
@@ -45,7 +45,7 @@ impl Sensor {
     }
 }
 
-/// What a segment did, earth axes.
+/// Sums of a segment, earth axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Swept {
     /// Attitude at its end.
@@ -54,7 +54,7 @@ pub(super) struct Swept {
     pub velocity: [f64; 3],
     pub position: [f64; 3],
     pub secs: f64,
-    /// By bias (3) and the gyro's matrix (9).
+    /// Derivative by bias (3) and the gyro's matrix (9).
     pub by_turn: [[f64; TURN]; 3],
     /// The same, then by the accelerometer's bias (3), matrix (9), time offset.
     pub by_velocity: [[f64; PUSH]; 3],
@@ -66,14 +66,14 @@ pub(super) struct Swept {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FieldMeans {
     pub samples: f64,
-    /// Of the field as it was measured, earth axes.
+    /// Mean field as it was measured, earth axes.
     pub measured: [f64; 3],
-    /// Of the matrix, and of its columns times the measured components: `[r][3 j + l]`.
+    /// Derivative by the matrix, and of its columns times the measured components: `[r][3 j + l]`.
     pub r: [[f64; 3]; 3],
     pub rm: [[f64; 9]; 3],
-    /// By the time offset.
+    /// Derivative by the time offset.
     pub by_time: [f64; 3],
-    /// By bias and the gyro's matrix.
+    /// Derivative by bias and the gyro's matrix.
     pub by_turn: [[f64; TURN]; 3],
 }
 
@@ -251,7 +251,7 @@ impl FieldMeans {
     }
 }
 
-/// With the product by the gyro's matrix that the loop leaves out.
+/// Adds the product by the gyro's matrix that the loop leaves out.
 fn by_bias(mut d: [[f64; TURN]; 3], gyro: &Matrix3<f64>) -> [[f64; TURN]; 3] {
     for row in &mut d {
         let bare = Vector3::new(row[0], row[1], row[2]);

@@ -100,7 +100,7 @@ struct Work {
     spacing: f64,
 }
 
-/// What a phase left, and what it says of the nodes.
+/// Solution of a phase, and what it states of the nodes.
 struct Solved {
     state: State,
     covariance: Vec<Vec<f64>>,
@@ -240,7 +240,7 @@ impl Work {
         }
     }
 
-    /// What the gyro's bias may be where nothing rests.
+    /// Prior of the gyro's bias where nothing rests.
     fn biases(&self, filter: Option<&Realtime>) -> Vec<Vector3<f64>> {
         let inner = self.segments.iter().filter(|segment| !segment.is_break);
         let stillest = inner.min_by(|a, b| a.spread[0].total_cmp(&b.spread[0]));

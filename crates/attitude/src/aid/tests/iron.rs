@@ -4,7 +4,7 @@ use super::golden::{Run, sample, truth};
 use crate::aid::{Prior, Settings};
 use nalgebra::{Matrix3, Vector3};
 
-/// Of a field of 44.
+/// Hard iron in a field of 44.
 const IRON: Vector3<f64> = Vector3::new(2.0, -1.5, 1.0);
 
 /// Two minutes of the golden motion with hard iron, and the root mean square of the heading's error in the second

@@ -1,4 +1,4 @@
-//! What the filter does with a body at rest, with bad values, with other axes, through our own propagator.
+//! Tests of the filter with a body at rest, with bad values, with other axes, through our own propagator.
 
 use super::golden::{Run, angle_at_end, plain, run, sample};
 use crate::aid::{Aided, Settings, Start};
@@ -297,7 +297,8 @@ fn a_clock_that_is_set_back_is_a_gap_of_unknown_length() {
     assert!(sigma.iter().all(|s| *s > 0.0 && *s < 8.7e-3), "{sigma}");
 }
 
-/// A filter that has had samples at 100 Hz for so long, with what a perfect gyro and accelerometer measure at each time.
+/// A filter that has had samples at 100 Hz for so long, with what a perfect gyro and accelerometer measure at each
+/// time.
 fn fed(
     settings: Settings,
     secs: i64,

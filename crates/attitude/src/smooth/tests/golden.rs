@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 /// Half of the last digit of six.
 const DIGITS: f64 = 5.1e-7;
 
-/// As the figures were made.
+/// Settings with which the figures were made.
 fn settings() -> Settings {
     Settings {
         motion: MotionModel::Independent,

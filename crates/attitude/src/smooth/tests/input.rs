@@ -86,7 +86,7 @@ fn nothing_but_nan_is_refused_and_some_of_it_is_counted() {
     }
 }
 
-/// What is said must be finite, and what is wrong must be said.
+/// Checks that what is stated is finite, and what is wrong is stated.
 fn is_sane(samples: &[Sample]) {
     let (smoothed, estimates) = smoothed(samples, &Settings::default());
     for estimate in &estimates {

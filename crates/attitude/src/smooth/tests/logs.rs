@@ -13,7 +13,7 @@ const IRON: [f64; 3] = [2.0, -1.0, 0.5];
 const FIELD: [f64; 3] = [0.0, 18.0, -45.0];
 const STEP_NANOS: i64 = 10_000_000;
 
-/// What moves.
+/// Motion of the body.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Motion {
     Hand,
@@ -117,7 +117,7 @@ pub(super) fn log(motion: Motion) -> Log {
 }
 
 impl Log {
-    /// Without the magnetometer.
+    /// Removes the magnetometer.
     pub(super) fn plain(mut self) -> Log {
         self.samples
             .iter_mut()

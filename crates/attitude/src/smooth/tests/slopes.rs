@@ -106,7 +106,7 @@ impl Place {
     }
 }
 
-/// What a row holds of an unknown of the later node.
+/// Coefficient of an unknown of the later node in a row.
 fn by_next(row: &Row<WIDE>, unknown: usize) -> f64 {
     let held = [row.next.map(|next| (next, 1.0)), row.second];
     let of = |(state, by): (usize, f64)| if state == unknown { by } else { 0.0 };
@@ -233,7 +233,7 @@ fn rows_of_the_motion_are_those_of_differences() {
     check(process);
 }
 
-/// What a segment adds is the sum of its rows' products.
+/// Checks that a segment adds the sum of its rows' products.
 #[test]
 fn the_equations_are_the_products_of_their_rows() {
     let place = place();
