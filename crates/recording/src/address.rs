@@ -4,26 +4,26 @@
 
 use std::fmt;
 
-/// An address as somebody typed it, which may hold a password or a key. It is printed, logged and written in one form alone:
-/// without user and password, and with `...` in the place of the values behind its `?`.
+/// An address as somebody typed it, which may hold a password or a key. It is printed, logged and written in one form
+/// alone: without user and password, and with `...` in the place of the values behind its `?`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Address(String);
 
 impl Address {
-    /// With everything, for who connects there.
+    /// Text with everything, for who connects there.
     #[must_use]
     pub fn typed(&self) -> &str {
         &self.0
     }
 
-    /// What stands before `://`, in small letters; empty where there is none.
+    /// Scheme before `://`, in small letters; empty where there is none.
     #[must_use]
     pub fn scheme(&self) -> String {
         let scheme = self.0.split_once("://").map_or("", |(scheme, _)| scheme);
         scheme.to_ascii_lowercase()
     }
 
-    /// As it is printed, without what stands behind its `?`: its last part then ends as a file's name does.
+    /// Text as printed, without what stands behind its `?`: its last part then ends as a file's name does.
     #[must_use]
     pub fn place(&self) -> String {
         let printed = self.to_string();

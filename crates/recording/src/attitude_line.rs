@@ -1,23 +1,24 @@
-//! A line that says an attitude (`ATT`) -> numbers. Pure. Nothing in it is trusted: names are made fit for a terminal, and
-//! a number that is absent or `null` is NaN.
+//! A line that says an attitude (`ATT`) -> numbers. Pure. Nothing in it is trusted: names are made fit for a
+//! terminal, and a number that is absent or `null` is NaN.
 //!
-//! Apart from the samples of lines because it is read for itself: what a daemon says, and what was written to be compared.
+//! Apart from the samples of lines because it is read for itself: what a daemon says, and what was written to be
+//! compared.
 
 use crate::text::printable;
 use serde::Deserialize;
 use strapd_attitude::record::Nanos;
 
-/// What lines call the true attitude of simulated samples: a reference to hold estimates against, and no sample.
+/// Id in lines of the true attitude of simulated samples: a reference to hold estimates against, and no sample.
 pub const TRUTH_ID: &str = "truth";
 
 /// One attitude as a line says it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {
-    /// Which sensor.
+    /// Id of the sensor.
     pub id: String,
-    /// Its number.
+    /// Number.
     pub seq: u64,
-    /// When; an attitude at no time is none to compare with.
+    /// Stamp; an attitude at no time is none to compare with.
     pub stamp: Option<Nanos>,
     /// `[w, x, y, z]`, sensor (or body) to world.
     pub q: [f64; 4],
@@ -25,7 +26,7 @@ pub struct Attitude {
     pub rate: [f64; 3],
     /// 1 sigma about the body axes, degrees.
     pub sigma_deg: [f64; 3],
-    /// What there is to say of it.
+    /// Status words.
     pub status: Vec<String>,
     /// Holds and resets so far.
     pub reset: u64,
@@ -35,7 +36,7 @@ pub struct Attitude {
     pub body: String,
 }
 
-/// What is looked at before the rest is read: other classes have other values under the same names.
+/// Head that is looked at before the rest is read: other classes have other values under the same names.
 #[derive(Deserialize)]
 struct Head {
     #[serde(default)]

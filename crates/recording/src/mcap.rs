@@ -1,4 +1,5 @@
-//! Logs -> messages in a stable order: MCAP, and what is told as MCAP (ULog, bags of ROS 1 and of ROS 2 in SQLite). I/O.
+//! Logs -> messages in a stable order: MCAP, and what is told as MCAP (ULog, bags of ROS 1 and of ROS 2 in SQLite).
+//! I/O.
 //!
 //! A stage of its own because recordings come damaged, and general readers stop at the first
 //! fault, believe every length, or do not look at checksums. Here every length is held
@@ -63,7 +64,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What the reader believes a file's length fields up to.
+/// Limits up to which the reader believes a file's length fields.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
     /// Longest record that is loaded, and largest chunk that is unpacked, bytes. Attachments are
@@ -90,16 +91,16 @@ pub struct Reader {
     format: Format,
     /// The files beside a database.
     beside: Beside,
-    /// Which chunks of what is elsewhere need not be read.
+    /// Index of the chunks of a remote object that need not be read.
     index: Option<Arc<Index>>,
 }
 
-/// What a recorder that was killed leaves beside a database.
+/// Files that a recorder that was killed leaves beside a database.
 #[derive(Clone, Debug, Default)]
 struct Beside {
     /// The file `-wal`.
     wal: Option<Arc<LogFile>>,
-    /// There is a file `-journal` with pages as they were before a change that was not ended.
+    /// Whether there is a file `-journal` with pages as they were before a change that was not ended.
     has_journal: bool,
 }
 
@@ -181,8 +182,8 @@ impl Reader {
         })
     }
 
-    /// Reads a log from a stream; `name` is what errors call it. What is read in another order than that of its bytes is
-    /// first put into a file without a name.
+    /// Reads a log from a stream; `name` is what errors call it. What is read in another order than that of its bytes
+    /// is first put into a file without a name.
     ///
     /// # Errors
     /// [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`], [`Error::NoRoom`].
@@ -228,7 +229,7 @@ impl Reader {
         Reader { limits, ..self }
     }
 
-    /// What it is.
+    /// Format.
     #[must_use]
     pub fn format(&self) -> Format {
         self.format
@@ -301,7 +302,7 @@ fn read_error(path: &Path, offset: u64, source: std::io::Error) -> Error {
     }
 }
 
-/// Which log a file is; if none, both of its ends tell what it is.
+/// Format of the log in a file; if none, both of its ends tell what it is.
 fn format_of(file: &LogFile) -> Result<Format> {
     let read = |at: u64, most: usize| {
         let mut bytes = vec![0; most];

@@ -34,7 +34,7 @@ impl Pool {
         &self.pool
     }
 
-    /// How many workers.
+    /// Number of workers.
     #[must_use]
     pub fn threads(&self) -> usize {
         self.pool.current_num_threads()

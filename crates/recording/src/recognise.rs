@@ -7,23 +7,23 @@ use strapd_attitude::setting::COLUMNS;
 
 mod zip;
 
-/// How many of a file's first bytes are looked at. Of a stream eight are enough for most.
+/// Number of a file's first bytes that are looked at. Of a stream eight are enough for most.
 pub const FIRST: usize = 1024;
 
-/// How many of its last bytes tell what an archive holds.
+/// Number of its last bytes that tell what an archive holds.
 pub const LAST: usize = 64 << 10;
 
 /// A known format that is not read.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Foreign {
-    /// What it is, with its article: `a ZIP archive`.
+    /// Name with its article: `a ZIP archive`.
     pub name: &'static str,
-    /// What to do, where FILE is the input.
+    /// Advice, where FILE is the input.
     way_in: String,
 }
 
 impl Foreign {
-    /// What to do, with commands that name the input, where its name can stand in a command as it is.
+    /// Advice with commands that name the input, where its name can stand in a command as it is.
     #[must_use]
     pub fn help(&self, input: &str) -> String {
         match is_plain(input) {
@@ -39,7 +39,7 @@ fn is_plain(word: &str) -> bool {
     !word.is_empty() && !word.starts_with('-') && word.bytes().all(plain)
 }
 
-/// Where a format has its mark, the mark, what it is called, and the way in.
+/// Row of a known format: where its mark is, the mark, its name, and the way in.
 type Known = (usize, &'static [u8], &'static str, &'static str);
 
 const LINES: &str =
@@ -177,10 +177,10 @@ const KNOWN: &[Known] = &[
     ),
 ];
 
-/// Those that are only text when written as lines.
+/// Formats that are only text when written as lines.
 const AS_LINES: &[&str] = &["HDF5", "MATLAB", "NumPy", "Arrow", "blackbox", "video"];
 
-/// What a file is that begins and ends with these bytes, when it is known and not read.
+/// Format of a file that begins and ends with these bytes, when it is known and not read.
 #[must_use]
 pub fn foreign(first: &[u8], last: &[u8]) -> Option<Foreign> {
     marked(first, last).or_else(|| text(first))

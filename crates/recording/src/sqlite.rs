@@ -1,6 +1,7 @@
 //! An SQLite database, whole or damaged -> the rows of its tables. Pure: who has the bytes is [`Pages`].
 //!
-//! A stage of its own because a recorder that is killed leaves a database SQLite itself may refuse, and stops reading at
+//! A stage of its own because a recorder that is killed leaves a database SQLite itself may refuse, and stops reading
+//! at
 //! the first bad page of. Here each page is looked at once, whatever the others say of it; what can not be read costs
 //! its own rows, and is told.
 //!
@@ -35,7 +36,7 @@ pub(crate) use crate::format::SQLITE_MAGIC as MAGIC;
 
 use std::io;
 
-/// Who has the pages of a database, numbered from 1.
+/// Pages of a database, numbered from 1.
 pub(crate) trait Pages {
     /// The greatest number of one that is there.
     fn count(&self) -> u32;

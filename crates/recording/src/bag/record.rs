@@ -17,12 +17,12 @@ pub(crate) mod op {
 /// Longest head that is believed; of those in use only a topic's name makes one longer than 100 bytes.
 const MAX_HEAD: usize = 64 << 10;
 
-/// What a record's head says, as far as it is asked for; fields it has not are `None`.
+/// Head of a record, as far as it is asked for; fields it has not are `None`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Head<'a> {
     pub(crate) op: u8,
     pub(crate) conn: Option<u32>,
-    /// When the message was received, ns.
+    /// Time at which the message was received, ns.
     pub(crate) time: Option<u64>,
     pub(crate) topic: Option<&'a str>,
     pub(crate) compression: Option<&'a str>,
@@ -30,10 +30,10 @@ pub(crate) struct Head<'a> {
     pub(crate) size: Option<u32>,
     /// Messages an index record counts; connections a chunk's.
     pub(crate) count: Option<u32>,
-    /// Where the index begins; 0 when the recorder was killed.
+    /// Offset of the index; 0 when the recorder was killed.
     pub(crate) index_pos: Option<u64>,
     pub(crate) chunk_count: Option<u32>,
-    /// Where the record's data begin, and how long they are.
+    /// Offset of the record's data, and their length.
     pub(crate) data_at: usize,
     pub(crate) data_len: usize,
 }
@@ -45,7 +45,8 @@ impl Head<'_> {
     }
 }
 
-/// The head of the record that begins here. `Err` says how many bytes are needed to tell, or `None` that it is no record.
+/// The head of the record that begins here. `Err` says how many bytes are needed to tell, or `None` that it is no
+/// record.
 pub(crate) fn head(data: &[u8]) -> Result<Head<'_>, Option<usize>> {
     let mut bytes = Bytes::new(data);
     let length = bytes.u32().ok_or(Some(4))? as usize;
@@ -88,12 +89,12 @@ fn parse(fields: &[u8]) -> Option<Head<'_>> {
     (head.op != 0).then_some(head)
 }
 
-/// How a chunk's type stands in its head.
+/// Mark of a chunk's type in its head.
 const MARK: &[u8] = b"\x04\0\0\0op=\x05";
 /// Longest head of a chunk: three fields.
 const CHUNK_HEAD: usize = 64;
 
-/// Where the first chunk begins in `data`, if one does whose head is whole; else from where on the next bytes may
+/// Offset of the first chunk in `data`, if one begins there whose head is whole; else from where on the next bytes may
 /// complete one.
 pub(crate) fn chunk_at(data: &[u8]) -> Result<usize, usize> {
     for mark in memchr::memmem::find_iter(data, MARK) {

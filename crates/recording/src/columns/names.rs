@@ -70,7 +70,7 @@ pub(crate) enum Meant {
     Step,
     /// A running number.
     Counter,
-    /// No use.
+    /// Column of no use.
     Nothing,
 }
 

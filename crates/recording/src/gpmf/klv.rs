@@ -9,7 +9,7 @@ pub(crate) const HEAD: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item<'a> {
     pub(super) key: [u8; 4],
-    /// What its numbers are; 0 for items in it.
+    /// Kind of its numbers; 0 for items in it.
     pub(super) kind: u8,
     /// Bytes of one structure.
     pub(super) size: usize,
@@ -23,7 +23,7 @@ pub(crate) fn length(head: &[u8; HEAD]) -> usize {
     HEAD + data.next_multiple_of(4)
 }
 
-/// Where in `data` the next device may begin.
+/// Offset in `data` at which the next device may begin.
 pub(crate) fn next_device(data: &[u8]) -> Option<usize> {
     memchr::memmem::find(data, &super::MAGIC)
 }
@@ -64,7 +64,7 @@ impl<'a> Item<'a> {
         Items(if self.kind == 0 { self.data } else { &[] })
     }
 
-    /// Its text.
+    /// Text.
     pub(super) fn text(&self) -> String {
         let text: String = self.data.iter().map(|b| char::from(*b)).collect();
         text.trim_end_matches('\0').to_owned()
@@ -81,12 +81,12 @@ impl<'a> Item<'a> {
         })
     }
 
-    /// How many numbers a structure of it has.
+    /// Count of the numbers in a structure of it.
     pub(super) fn columns(&self) -> usize {
         self.width().map_or(0, |width| self.size / width)
     }
 
-    /// Its numbers, one after the other.
+    /// Numbers, one after the other.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> + use<'a> {
         let (kind, width) = (self.kind, self.width().unwrap_or(1));
         let data = if self.width().is_some() {
@@ -98,7 +98,7 @@ impl<'a> Item<'a> {
             .map(move |bytes| number(kind, bytes))
     }
 
-    /// Its only number, if it is a whole one that is not negative.
+    /// Only number, if it is a whole one that is not negative.
     pub(super) fn count(&self) -> Option<u64> {
         match (self.kind, self.data) {
             (b'L', data) => data

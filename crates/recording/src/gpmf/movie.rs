@@ -9,7 +9,7 @@ use std::io;
 const LONGEST: u64 = 64 << 20;
 /// Most boxes of a file that are looked at.
 const MOST: usize = 10_000;
-/// From 1904, where videos count from, to 1970, s.
+/// Seconds from 1904, where videos count from, to 1970.
 const EPOCH: u64 = 2_082_844_800;
 
 /// Times of creation that are believed, s since 1970: of this century.
@@ -119,7 +119,7 @@ pub(crate) enum Lasts {
 pub(crate) struct Sample {
     pub(crate) offset: u64,
     pub(crate) size: u64,
-    /// From the beginning of the track, ns.
+    /// Time from the beginning of the track, ns.
     pub(crate) at: u64,
     pub(crate) lasts: Lasts,
 }
@@ -127,7 +127,7 @@ pub(crate) struct Sample {
 /// The track of telemetry of a video.
 #[derive(Debug)]
 pub(crate) struct Movie {
-    /// When it was recorded by the camera's calendar, s since 1970; 0 where it does not say.
+    /// Time of recording by the camera's calendar, s since 1970; 0 where it is not stated.
     pub(crate) created: u64,
     timescale: u64,
     /// Sizes of payloads, or that of all and how many.
@@ -136,20 +136,20 @@ pub(crate) struct Movie {
     chunks: Vec<u64>,
     /// First run, payloads in each from there on, and a word.
     runs: Vec<u32>,
-    /// How many payloads, and how long each lasts.
+    /// Numbers of payloads, and how long each lasts.
     lengths: Vec<u32>,
     next: Next,
 }
 
-/// Where the next payload is.
+/// Place of the next payload.
 #[derive(Clone, Copy, Debug, Default)]
 struct Next {
     sample: usize,
     chunk: usize,
-    /// In its run, and where in the file.
+    /// Index in its run, and offset in the file.
     in_chunk: u32,
     offset: u64,
-    /// Which entry of `runs`, of `lengths`, and how many of the latter are used.
+    /// Index in `runs`, in `lengths`, and the number of the latter that are used.
     run: usize,
     length: usize,
     used: u32,
@@ -207,7 +207,7 @@ impl Movie {
         })
     }
 
-    /// How many payloads it says that it has.
+    /// Number of payloads that it states.
     pub(crate) fn said(&self) -> u64 {
         match &self.sizes {
             Ok(sizes) => sizes.len() as u64,
@@ -215,7 +215,7 @@ impl Movie {
         }
     }
 
-    /// How many payloads it has told of.
+    /// Number of payloads that it has given.
     pub(crate) fn told(&self) -> u64 {
         self.next.sample as u64
     }

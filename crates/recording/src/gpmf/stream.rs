@@ -21,13 +21,13 @@ pub(super) struct Stream {
     pub(super) what: What,
     /// About and along x, y, z.
     pub(super) samples: Vec<[f64; 3]>,
-    /// When the first was taken, us on the camera's clock.
+    /// Time of the first, us on the camera's clock.
     pub(super) stamp: Option<u64>,
-    /// Which axes its columns are, as letters: lower case is reversed.
+    /// Axes of its columns, as letters: lower case is reversed.
     pub(super) axes: String,
 }
 
-/// What a payload holds.
+/// Contents of a payload.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(super) struct Payload {
     pub(super) streams: Vec<Stream>,

@@ -1,7 +1,7 @@
 //! Payloads in order -> messages with stamps. Pure.
 //!
-//! Apart from the samples because the time of a payload's samples shows only when the next one is known: they lie evenly
-//! between the beginnings of both.
+//! Apart from the samples because the time of a payload's samples shows only when the next one is known: they lie
+//! evenly between the beginnings of both.
 
 use super::stream::{Payload, Stream, What, payload};
 use super::{Lasts, SECOND};
@@ -10,7 +10,7 @@ use crate::records::imu;
 use crate::records::transcript::Transcript;
 use std::collections::{BTreeMap, VecDeque};
 
-/// How far the stamps of a stream may be from the time of its payload, and how far the next payload may be; else they
+/// Largest distance of a stream's stamps from the time of its payload, and of the next payload; else they
 /// are damage, ns.
 const FAR: u64 = 5_000_000_000;
 
@@ -26,7 +26,7 @@ pub(crate) struct Transcriber {
     so_far: BTreeMap<(u32, What), (u64, u64)>,
     /// A stamp of the camera's clock, us, and the time it stands for, ns.
     anchor: Option<(u64, u64)>,
-    /// What a camera calls itself.
+    /// Name that a camera gives itself.
     pub(crate) camera: String,
     /// Why something of the payload that came last is not read, and bytes of it that are none.
     pub(crate) refused: Vec<&'static str>,
@@ -49,8 +49,8 @@ struct Queue {
 }
 
 impl Queue {
-    /// Tells the rates up to the time `until`, all where there is none, and the first `least` in any case, each with the
-    /// last force since the rate before it.
+    /// Tells the rates up to the time `until`, all where there is none, and the first `least` in any case, each with
+    /// the last force since the rate before it.
     fn tell(&mut self, channel: u16, until: Option<u64>, least: usize, to: &mut Transcript) {
         let mut message = Vec::new();
         let mut told = 0;
@@ -197,7 +197,7 @@ impl Transcriber {
         }
     }
 
-    /// When the first sample of a stream was taken: by its own stamp, if that can be, else with its payload.
+    /// Time of the first sample of a stream: by its own stamp, if that can be, else with its payload.
     fn begin(&self, now: &Timed, of: &Stream) -> u64 {
         let own = self.anchor.zip(of.stamp).map(|((stamp, time), own)| {
             let since = i128::from(own) - i128::from(stamp);
@@ -241,5 +241,5 @@ impl Transcriber {
     }
 }
 
-/// What the axes belong to.
+/// Frame of the axes.
 const FRAME: &str = "camera";

@@ -15,24 +15,24 @@ const TIMES: std::ops::Range<u64> = 1_000_000_000_000_000..4_000_000_000_000_000
 /// A frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Frame<'a> {
-    /// When it was received, us since 1970.
+    /// Time at which it was received, us since 1970.
     pub(super) time: u64,
     pub(super) system: u8,
     pub(super) component: u8,
     pub(super) message: u32,
-    /// Without zeros at its end, in the second version.
+    /// Payload, without zeros at its end in the second version.
     pub(super) payload: &'a [u8],
     /// Bytes of all, with the time.
     pub(super) total: usize,
     pub(super) checked: Checked,
 }
 
-/// What its checksum says.
+/// Verdict of its checksum.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Checked {
     Right,
     Wrong,
-    /// It can not be known: its message is none that is read.
+    /// Unknown: its message is none that is read.
     Unknown,
 }
 

@@ -1,6 +1,7 @@
 //! The payload of a message -> a sample. Pure.
 //!
-//! Apart from the frames because here is all that is known of single messages: their numbers, their fields, their units.
+//! Apart from the frames because here is all that is known of single messages: their numbers, their fields, their
+//! units.
 
 use crate::records::Bytes;
 
@@ -11,7 +12,7 @@ const MILLI_G: f64 = 9.806_65e-3;
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Known {
     pub(super) name: &'static str,
-    /// What the checksum has beside the frame: a number made of the fields.
+    /// Number made of the fields that the checksum has beside the frame.
     extra: u8,
     form: Form,
 }
@@ -31,9 +32,9 @@ enum Form {
 /// A sample of a message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Sample {
-    /// Since the vehicle was switched on, or since 1970, ns.
+    /// Time since the vehicle was switched on, or since 1970, ns.
     pub(super) time: u64,
-    /// Which of several sensors, where the message says it.
+    /// Index of the sensor, where the message states it.
     pub(super) sensor: u8,
     /// rad/s; x forward, y left, z up.
     pub(super) rate: [f64; 3],
@@ -61,7 +62,7 @@ pub(super) fn of(number: u32) -> Option<Known> {
     known.find(|(n, _)| *n == number).map(|(_, known)| *known)
 }
 
-/// What its checksum needs beside the frame.
+/// Number that its checksum needs beside the frame.
 pub(super) fn checksum_of(number: u32) -> Option<u8> {
     of(number).map(|known| known.extra)
 }

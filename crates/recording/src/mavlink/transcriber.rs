@@ -1,7 +1,7 @@
 //! Bytes of a log, in any cut -> records, and what was wrong. Pure.
 //!
-//! Apart from the frames because it alone decides where one begins: a frame is believed by its checksum, or, where that can
-//! not be known, if another follows it.
+//! Apart from the frames because it alone decides where one begins: a frame is believed by its checksum, or, where
+//! that can not be known, if another follows it.
 
 use super::frame::{Checked, Frame, LONGEST, frame, is_log};
 use super::message;
@@ -13,17 +13,17 @@ use std::collections::BTreeMap;
 /// Bytes looked at to believe a frame, and to find one.
 const WINDOW: usize = LONGEST + 16;
 
-/// What was wrong, and where.
+/// Fault, and its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Fault {
     pub(crate) offset: u64,
     pub(crate) kind: FaultKind,
 }
 
-/// What can be wrong with a log.
+/// Kind of a fault in a log.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum FaultKind {
-    /// It ends inside a frame.
+    /// End inside a frame.
     Cut { need: u64, have: u64 },
     /// Bytes that are no frame.
     Garbage { skipped: u64 },
@@ -33,7 +33,7 @@ pub(crate) enum FaultKind {
     TooMany,
 }
 
-/// Who sent a sample: system, component, name of the message, sensor.
+/// Sender of a sample: system, component, name of the message, sensor.
 type Sender = (u8, u8, &'static str, u8);
 
 /// A log under way.
@@ -43,7 +43,7 @@ pub(crate) struct Transcriber {
     channels: BTreeMap<Sender, (u16, u32)>,
     /// The first that sent a sample: its topics have plain names.
     first: Option<(u8, u8)>,
-    /// Where bytes begin that are no frame.
+    /// Offset at which bytes begin that are no frame.
     lost: Option<u64>,
     message: Vec<u8>,
     pub(crate) faults: Vec<Fault>,

@@ -16,10 +16,10 @@ use std::sync::Arc;
 /// Buffers larger than this are given back after use, so that one large chunk does not stay.
 const KEEP: usize = 8 << 20;
 
-/// What a block costs that has no bytes.
+/// Cost of a block that has no bytes.
 const NEXT_TO_NOTHING: usize = 4 << 10;
 
-/// How a chunk is packed.
+/// Compression of a chunk.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Compression {
     /// Not at all.
@@ -42,7 +42,7 @@ impl Compression {
         }
     }
 
-    /// By the name in a bag.
+    /// Compression by its name in a bag.
     pub(super) fn of_bag(name: &str) -> Option<Self> {
         match name {
             "none" => Some(Compression::None),
@@ -67,7 +67,7 @@ impl Compression {
 /// A stretch of the log whose records are worked on together.
 #[derive(Debug)]
 pub(super) struct Block {
-    /// Where it begins in the file.
+    /// Offset in the file.
     pub(super) offset: u64,
     pub(super) kind: Kind,
     pub(super) payload: Payload,
@@ -77,7 +77,7 @@ pub(super) struct Block {
 pub(super) enum Kind {
     /// Unchunked records, one after another; their framing has been checked.
     Run,
-    /// What another container holds, told as records.
+    /// Contents of another container, as records.
     Transcript,
     /// A chunk of a bag of ROS 1, or one record of it.
     Bag {
@@ -105,7 +105,7 @@ pub(super) enum Kind {
 
 #[derive(Debug)]
 pub(super) enum Payload {
-    /// In the file; read by whoever works on it.
+    /// Bytes in the file; read by whoever works on it.
     At {
         file: Arc<LogFile>,
         offset: u64,
@@ -115,7 +115,7 @@ pub(super) enum Payload {
 }
 
 impl Block {
-    /// What another container holds from `offset` on, told as records; nothing of none.
+    /// Block of what another container holds from `offset` on, as records; `None` of none.
     pub(super) fn of_records(offset: u64, bytes: Vec<u8>) -> Option<Block> {
         let range = 0..bytes.len();
         (!bytes.is_empty()).then_some(Block {
@@ -183,7 +183,7 @@ impl std::fmt::Debug for Buffers {
     }
 }
 
-/// What is read at a time: its CRC is taken while it is still in the cache.
+/// Number of bytes read at a time: their CRC is taken while they are still in the cache.
 const PIECE: usize = 128 << 10;
 
 /// A slice of exactly `n` bytes of `buf`, which grows but is not shrunk or zeroed again.
@@ -364,12 +364,12 @@ fn are_too_many(records: &[u8], packed: usize) -> bool {
 /// like can be packed so.
 const SUSPECT: usize = 1000;
 
-/// How much of a chunk was unpacked.
+/// Amount of a chunk that was unpacked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Unpacked {
     /// All of it: so many bytes, or more than there is room for.
     All(usize),
-    /// Its records, up to and with the head of one with opcode 0, which none has.
+    /// Records, up to and with the head of one with opcode 0, which none has.
     Records(usize),
 }
 

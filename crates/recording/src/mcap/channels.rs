@@ -9,7 +9,7 @@ use super::record::{ChannelRecord, SchemaRecord, op};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// How a channel's payloads are laid out, in the words of the file.
+/// Layout of a channel's payloads, in the words of the file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Schema {
     /// Id in the file.
@@ -25,7 +25,7 @@ pub struct Schema {
 /// A stream of messages in the log.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Channel {
-    /// Which of the walk's channels this is, from 0 in the order of definition. Two channels of
+    /// Index among the walk's channels, from 0 in the order of definition. Two channels of
     /// one log may share an id or a topic, never an index.
     pub index: usize,
     /// Id in the file.

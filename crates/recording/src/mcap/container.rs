@@ -71,7 +71,7 @@ impl Container {
         }
     }
 
-    /// Where it has come to, in bytes.
+    /// Position it has come to, in bytes.
     pub(super) fn position(&self) -> u64 {
         match self {
             Container::Mcap(scanner) => scanner.tape().position(),
@@ -105,7 +105,7 @@ impl Container {
         }
     }
 
-    /// What the log says about itself, and what was wrong with it.
+    /// Facts that the log states about itself, and what was wrong with it.
     pub(super) fn finish(self) -> (Facts, Problems) {
         match self {
             Container::Mcap(scanner) => (scanner.facts, scanner.problems),

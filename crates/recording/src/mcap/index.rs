@@ -1,10 +1,13 @@
 //! A summary's index of chunks -> which of them need not be read. Pure.
 //!
-//! For what is elsewhere alone, where what is not read is not fetched: on a disk a walk over everything is as fast, and sees
-//! damage wherever it is. An index is a claim, so it is used only where it is proved by another: the summary's CRC holds, chunks
-//! stand in order and do not overlap, and the messages of every channel, counted by the lengths of the chunks' own indexes, are
-//! exactly those that the statistics count. Then no message of a wanted topic can be outside the chunks that are read, unless both
-//! lie alike; and what is read is held against the index ([`PassedOver::agrees`]).
+//! For what is elsewhere alone, where what is not read is not fetched: on a disk a walk over everything is as fast,
+//! and sees
+//! damage wherever it is. An index is a claim, so it is used only where it is proved by another: the summary's CRC
+//! holds, chunks
+//! stand in order and do not overlap, and the messages of every channel, counted by the lengths of the chunks' own
+//! indexes, are
+//! exactly those that the statistics count. Then no message of a wanted topic can be outside the chunks that are
+//! read, unless both lie alike; and what is read is held against the index ([`PassedOver::agrees`]).
 
 use super::Limits;
 use super::block::Compression;
@@ -15,9 +18,9 @@ use std::ops::Range;
 
 /// Bytes of an index of messages beside 16 for each: opcode, length, channel, length of the entries.
 const MESSAGE_INDEX: u64 = 15;
-/// What a chunk takes beside its records and the name of its compression.
+/// Size of a chunk beside its records and the name of its compression.
 const CHUNK_HEAD: u64 = 9 + 40;
-/// What may be read behind a stretch to see what follows.
+/// Number of bytes that may be read behind a stretch to see what follows.
 const BEHIND: u64 = 1 << 10;
 
 /// The chunks of a log, by their place.
@@ -32,7 +35,7 @@ pub(super) struct Index {
 #[derive(Clone, Debug)]
 struct Indexed {
     at: u64,
-    /// Behind the indexes of its messages.
+    /// End behind the indexes of its messages.
     end: u64,
     unpacked: usize,
     compression: Option<Compression>,
@@ -49,19 +52,19 @@ pub(super) struct Passed {
     pub(super) compression: Option<Compression>,
 }
 
-/// What a walk leaves out, and what it should meet.
+/// Parts that a walk leaves out, and what it should meet.
 #[derive(Debug)]
 pub(super) struct PassedOver {
     wanted: BTreeSet<u16>,
     /// Wanted messages in each chunk that is read.
     met: BTreeMap<u64, u64>,
-    /// In order of place.
+    /// Chunks in order of place.
     pub(super) chunks: Vec<Passed>,
     pub(super) counts: BTreeMap<u16, u64>,
     pub(super) times: Option<(u64, u64)>,
 }
 
-/// What the summary says of one chunk; `None` where that can not be.
+/// Entry of the summary about one chunk; `None` where it cannot be.
 fn indexed(of: &ChunkIndex<'_>, limits: Limits) -> Option<Indexed> {
     let at = of.chunk_start_offset;
     let records = at.checked_add(of.chunk_length)?;
@@ -152,7 +155,8 @@ impl Index {
         channels.all(|id| definitions.channels.contains_key(id))
     }
 
-    /// What a walk that wants these channels leaves out; of `only_firsts`, which wants the first message of each, more.
+    /// Parts that a walk leaves out which wants these channels; of `only_firsts`, which wants the first message of
+    /// each, more.
     pub(super) fn passed_over(&self, wanted: BTreeSet<u16>, only_firsts: bool) -> PassedOver {
         let mut open = wanted.clone();
         let (mut met, mut chunks) = (BTreeMap::new(), Vec::new());
@@ -185,7 +189,8 @@ impl Index {
         }
     }
 
-    /// What is read of the log up to its summary where these chunks are not, in order, with a little behind each stretch.
+    /// Ranges read of the log up to its summary where these chunks are not, in order, with a little behind each
+    /// stretch.
     pub(super) fn rest(&self, passed: &[Passed]) -> Vec<Range<u64>> {
         let (mut rest, mut at) = (Vec::new(), 0);
         for chunk in passed {

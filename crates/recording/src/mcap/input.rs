@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// How much a stream is allowed to make us allocate at once on the word of a length field.
+/// Number of bytes that a stream may make us allocate at once on the word of a length field.
 const STEP: usize = 1 << 20;
 /// Handed-back buffers kept for reuse, and the largest worth keeping.
 const SPARE: usize = 32;
@@ -58,7 +58,7 @@ impl LogFile {
         }
     }
 
-    /// What is elsewhere.
+    /// Remote object, if it is one.
     pub(super) fn object(&self) -> Option<&dyn Object> {
         match &self.bytes {
             Bytes::File(_) => None,
@@ -223,12 +223,12 @@ impl Tape {
         self.remaining().is_none_or(|r| n <= r)
     }
 
-    /// What is buffered ahead of the position already.
+    /// Bytes buffered ahead of the position already.
     fn ahead(&self) -> &[u8] {
         self.buf.get(self.start..self.end).unwrap_or(&[])
     }
 
-    /// At least `need` bytes ahead of the position, less only at the end of the input. Where it
+    /// Reads ahead at least `need` bytes of the position, less only at the end of the input. Where it
     /// has to read, it reads `want`, so that many small needs cost one read.
     pub(super) fn available(&mut self, need: usize, want: usize) -> io::Result<&[u8]> {
         if self.end - self.start < need && !self.at_end {

@@ -19,11 +19,11 @@ use std::ops::ControlFlow;
 pub struct Listed<'a> {
     /// Offset in the file of its chunk, or of itself when it is in none.
     pub offset: u64,
-    /// Its offset in the unpacked chunk; `None` when it is in none.
+    /// Offset in the unpacked chunk; `None` when it is in none.
     pub inner: Option<u64>,
     /// The record.
     pub record: Record<'a>,
-    /// Its body as it was written, for copying.
+    /// Body as it was written, for copying.
     pub body: &'a [u8],
 }
 

@@ -18,9 +18,9 @@ pub struct Message<'a> {
     pub channel: &'a Arc<Channel>,
     /// The publisher's count.
     pub sequence: u32,
-    /// When it was recorded, ns.
+    /// Time at which it was recorded, ns.
     pub log_time: u64,
-    /// When it was published, ns.
+    /// Time at which it was published, ns.
     pub publish_time: u64,
     /// The payload.
     pub data: &'a [u8],
@@ -30,10 +30,10 @@ pub struct Message<'a> {
     pub inner: u64,
 }
 
-/// What a channel's messages add up to. Times are the least and the greatest log time, ns.
+/// Totals of a channel's messages. Times are the least and the greatest log time, ns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Tally {
-    /// How many.
+    /// Number of messages.
     pub messages: u64,
     /// Least log time.
     pub first: u64,
@@ -71,7 +71,7 @@ impl Tally {
     }
 }
 
-/// What was met in one block, by channel index.
+/// Totals of one block, by channel index.
 #[derive(Debug, Default)]
 pub(super) struct Met {
     tallies: Vec<Tally>,
@@ -136,7 +136,7 @@ pub(super) enum Stop {
 }
 
 impl Stop {
-    /// What ended a pass before the end of its records, and where.
+    /// Fault that ended a pass before the end of its records, and its place.
     pub(super) fn fault(self) -> Option<(ProblemKind, usize)> {
         match self {
             Stop::Broken { at, length } => {
@@ -152,7 +152,7 @@ impl Stop {
     }
 }
 
-/// Where a block lies: what its messages report as their place.
+/// Place of a block: what its messages report as theirs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) offset: u64,

@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-/// How far to look ahead. The defaults hold a few MB.
+/// Look-ahead. The defaults hold a few MB.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Lookahead {
     /// Blocks seen before one is let go ...
@@ -41,13 +41,13 @@ impl Default for Lookahead {
     }
 }
 
-/// In which order items are delivered.
+/// Order in which items are delivered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Order {
-    /// By log time, then place in the file, as far as the look-ahead reaches.
+    /// Order of log time, then place in the file, as far as the look-ahead reaches.
     #[default]
     LogTime,
-    /// By place in the file.
+    /// Order of place in the file.
     File,
 }
 
@@ -56,7 +56,7 @@ pub enum Order {
 pub(super) struct Batch<T> {
     pub(super) items: Vec<T>,
     times: Vec<u64>,
-    /// How often the log time stepped back from one message to the next.
+    /// Number of times that the log time stepped back from one message to the next.
     steps_back: u64,
     /// Memory of the items, and of what they hold elsewhere, at most about, bytes.
     weight: usize,

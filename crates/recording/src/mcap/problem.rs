@@ -1,11 +1,11 @@
-//! What was wrong with a file -> a bounded list that says where and how much was lost. Pure.
+//! Problems of a file -> a bounded list that states where and how much was lost. Pure.
 //!
 //! A stage of its own because a damaged log must still be read to its end: nothing here is an
 //! error, everything here is counted.
 
 use std::fmt;
 
-/// How many problems are kept in full; the rest are only counted, so that a hostile file
+/// Number of problems kept in full; the rest are only counted, so that a hostile file
 /// can not fill memory with complaints.
 const KEPT: usize = 100;
 
@@ -14,13 +14,13 @@ const KEPT: usize = 100;
 pub struct Problem {
     /// Byte offset in the file of the record it concerns.
     pub offset: u64,
-    /// What.
+    /// Kind.
     pub kind: ProblemKind,
     /// Messages lost by it, where that is known (from the message index behind a chunk).
     pub messages: Option<u64>,
 }
 
-/// What can be wrong with an MCAP file that can still be read on.
+/// Kind of a problem of an MCAP file that can still be read on.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ProblemKind {
@@ -47,9 +47,9 @@ pub enum ProblemKind {
     },
     /// A record longer than the limit.
     RecordTooLong {
-        /// Its opcode.
+        /// Opcode.
         opcode: u8,
-        /// Its length.
+        /// Length.
         length: u64,
         /// The limit.
         limit: u64,
@@ -63,12 +63,12 @@ pub enum ProblemKind {
     },
     /// A chunk packed by a method other than none, lz4, zstd.
     UnknownCompression {
-        /// Its name for it.
+        /// Name as the file has it.
         name: String,
     },
     /// A chunk that does not unpack.
     Unpack {
-        /// What the decompressor said.
+        /// Reason that the decompressor gave.
         why: String,
     },
     /// A chunk that unpacks to another size than it declares.
@@ -94,26 +94,26 @@ pub enum ProblemKind {
     },
     /// A record inside a chunk runs over the chunk's end; records before it were used.
     InnerRecord {
-        /// Where in the unpacked chunk.
+        /// Offset in the unpacked chunk.
         at: u64,
         /// Length of the record's body.
         length: u64,
     },
     /// Bytes inside a chunk that begin with opcode 0 and so are no record; records before them were used.
     NoInnerRecord {
-        /// Where in the unpacked chunk.
+        /// Offset in the unpacked chunk.
         at: u64,
     },
     /// Messages too short to hold a message header.
     ShortMessages,
     /// Messages on a channel that was never defined.
     UnknownChannel {
-        /// Its id.
+        /// Id.
         id: u16,
     },
     /// A schema or channel record whose lengths do not add up, or that is not UTF-8.
     BadDefinition {
-        /// Its opcode.
+        /// Opcode.
         opcode: u8,
     },
     /// Definitions beyond the memory limit for them; ignored.
@@ -159,19 +159,19 @@ pub enum ProblemKind {
     /// A record of a type this program does not know, or without what its type must have, between records that
     /// have (ULog).
     WrongRecord {
-        /// Its type, a letter.
+        /// Type, a letter.
         kind: u8,
         /// Bytes of its body.
         length: u64,
     },
     /// The logger was too slow, and dropped what came within this time (ULog).
     Dropout {
-        /// How long, ms.
+        /// Duration, ms.
         millis: u16,
     },
     /// A feature this program does not know, without which the rest may be misread (ULog).
     UnknownFeature {
-        /// Its flags.
+        /// Flags.
         bits: u64,
     },
     /// The first page of a database says no layout that there is.
@@ -188,12 +188,12 @@ pub enum ProblemKind {
     },
     /// Pages behind those of the last transaction of a database: the recorder was stopped.
     PagesUncommitted {
-        /// How many.
+        /// Number of pages.
         pages: u32,
     },
     /// A page of a database that can not be read.
     Page {
-        /// Its number, from 1.
+        /// Number of the page, from 1.
         page: u32,
         /// Why.
         why: &'static str,
@@ -220,7 +220,7 @@ pub enum ProblemKind {
     },
     /// Telemetry of a camera that can not be read.
     Telemetry {
-        /// What.
+        /// Description.
         why: &'static str,
     },
     /// A message whose checksum is wrong (MAVLink).
@@ -463,13 +463,13 @@ impl Problems {
         &self.first
     }
 
-    /// How many there were.
+    /// Number of problems.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.total
     }
 
-    /// How many of them lose, or may falsify, messages ([`ProblemKind::is_loss`]).
+    /// Number of these that lose, or may falsify, messages ([`ProblemKind::is_loss`]).
     #[must_use]
     pub fn losses(&self) -> u64 {
         self.losses

@@ -55,7 +55,7 @@ pub enum Record<'a> {
     },
 }
 
-/// Where the summary lies.
+/// Place of the summary.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub struct Footer {
@@ -64,7 +64,7 @@ pub struct Footer {
     pub summary_crc: u32,
 }
 
-/// How the payloads of a channel are laid out.
+/// Layout of the payloads of a channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub struct SchemaRecord<'a> {
@@ -96,7 +96,7 @@ pub struct MessageRecord<'a> {
     pub data: &'a [u8],
 }
 
-/// What stands before the records of a chunk.
+/// Fields before the records of a chunk.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub struct ChunkHead<'a> {

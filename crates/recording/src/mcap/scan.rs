@@ -20,7 +20,7 @@ use std::io;
 
 /// Bytes of unchunked records worked on together.
 const RUN: usize = 1 << 20;
-/// What is read to see a chunk's head and the few records around it.
+/// Number of bytes read to see a chunk's head and the few records around it.
 const PEEK: usize = 1 << 10;
 /// Bytes that may follow the known fields of a chunk record (the format may grow).
 const SLACK: u64 = 1 << 10;
@@ -32,10 +32,10 @@ const METADATA_READ: u64 = 64 << 10;
 /// times over on its way into the copy, and those in use are a thousand times shorter.
 const METADATA_COPIED: u64 = 8 << 20;
 
-/// What a log says about itself outside its messages.
+/// Facts that a log states about itself outside its messages.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Facts {
-    /// What the container is.
+    /// Format of the container.
     pub format: Format,
     /// Profile in the header, such as `ros2`.
     pub profile: String,
@@ -53,11 +53,11 @@ pub struct Facts {
     pub attachments: u64,
 }
 
-/// What is handed out besides blocks of messages.
+/// Items handed out besides blocks of messages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Besides {
     Nothing,
-    /// What a copy takes along, as blocks of its own: header, attachments, metadata.
+    /// Blocks of their own that a copy takes along: header, attachments, metadata.
     Attached,
     /// Every record, as [`Item::Other`].
     Everything,
@@ -78,9 +78,9 @@ pub(super) enum Item {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Section {
     Data,
-    /// After the end of data: schemas and channels here only repeat.
+    /// Summary, after the end of data: schemas and channels here only repeat.
     Summary,
-    /// After the footer.
+    /// End, after the footer.
     Footer,
 }
 
@@ -97,7 +97,7 @@ pub(super) struct Scanner {
     /// CRC of everything so far, while every byte has been seen (no chunk yet).
     crc: Option<crc32fast::Hasher>,
     done: bool,
-    /// How far to read ahead of a record's head.
+    /// Distance to read ahead of a record's head.
     peek: usize,
     /// Chunks that are not read, in order.
     passed: VecDeque<Passed>,
@@ -460,7 +460,7 @@ impl Scanner {
         Ok(())
     }
 
-    /// What stands at `at` can not be a record of `total` bytes: find the next chunk, or end.
+    /// Handles bytes at `at` that cannot be a record of `total` bytes: finds the next chunk, or ends.
     fn lost(&mut self, at: u64, total: u64) -> io::Result<Option<Item>> {
         let left = self
             .tape

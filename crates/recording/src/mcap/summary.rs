@@ -13,21 +13,21 @@ use std::collections::BTreeMap;
 use std::io;
 use std::sync::Arc;
 
-/// What is read of it at a time.
+/// Number of bytes read of it at a time.
 const WINDOW: usize = 256 << 10;
 
 const BROKEN: &str = "its records do not add up";
 
-/// What the summary says, checked as far as it can be without reading the data.
+/// Contents of the summary, checked as far as it can be without reading the data.
 #[derive(Debug, Default)]
 pub(super) struct Summary {
     pub(super) definitions: Fallback,
     pub(super) statistics: Option<Statistics>,
     /// Chunks by compression name.
     pub(super) chunks: BTreeMap<String, u64>,
-    /// Those of what is elsewhere.
+    /// Ranges gathered of a remote object.
     gathered: Option<Gathered>,
-    /// Which of them need not be read.
+    /// Index of what need not be read.
     pub(super) index: Option<Index>,
     /// Bytes of definitions so far.
     bytes: usize,

@@ -26,7 +26,7 @@ use std::sync::Arc;
 pub struct ChannelSurvey {
     /// The channel.
     pub channel: Arc<Channel>,
-    /// How many messages.
+    /// Number of messages.
     pub messages: u64,
     /// Least and greatest log time, ns; unknown when the summary was asked.
     pub times: Option<(u64, u64)>,
@@ -34,13 +34,13 @@ pub struct ChannelSurvey {
     pub bytes: Option<u64>,
 }
 
-/// How a header names this program, before its version.
+/// Name that a header gives this program, before its version.
 pub(crate) const OURS: &str = "strapd ";
 
-/// What is in a log.
+/// Contents of a log.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Survey {
-    /// What it says about itself.
+    /// Facts that it states about itself.
     pub facts: Facts,
     /// Bytes of the file; unknown for a stream.
     pub file_size: Option<u64>,
@@ -54,18 +54,18 @@ pub struct Survey {
     pub has_summary: bool,
     /// Whether the counts above are the summary's, not our own.
     pub from_summary: bool,
-    /// What was wrong.
+    /// Problems.
     pub problems: Problems,
-    /// What of it was not read: its summary says that nothing there was wanted.
+    /// Chunks that were not read: its summary states that nothing there was wanted.
     pub passed_over: PassedChunks,
 }
 
 /// Chunks that were not read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct PassedChunks {
-    /// How many.
+    /// Number of chunks.
     pub chunks: u64,
-    /// Their bytes as they lie in the file.
+    /// Size of them as they lie in the file, bytes.
     pub bytes: u64,
 }
 
@@ -134,7 +134,7 @@ impl Survey {
     }
 }
 
-/// What is in a file: from its summary when that holds together and has statistics, else by
+/// Surveys a file: from its summary when that holds together and has statistics, else by
 /// walking all of it. Damage in the data section shows only in a walk.
 ///
 /// # Errors

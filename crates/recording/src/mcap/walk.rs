@@ -25,11 +25,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// How a walk uses the machine. What is delivered, and in which order, does not depend on it but
+/// Use of the machine by a walk. What is delivered, and in which order, does not depend on it but
 /// for `lookahead`.
 #[derive(Clone, Copy, Debug)]
 pub struct WalkOptions<'p> {
-    /// Where to decode. `None`, a pool of one thread, or a call from inside the pool: all on the
+    /// Pool to decode in. `None`, a pool of one thread, or a call from inside the pool: all on the
     /// calling thread.
     pub pool: Option<&'p rayon::ThreadPool>,
     /// Bytes of blocks, packed and unpacked, on their way at once; one block may always be.
@@ -39,7 +39,7 @@ pub struct WalkOptions<'p> {
     pub hand_over: usize,
     /// Small batches are passed on together, at least this many items, but for the last.
     pub batch: usize,
-    /// How far ahead to look for messages that belong earlier.
+    /// Look-ahead for messages that belong earlier.
     pub lookahead: Lookahead,
     /// Whether to look ahead at all.
     pub order: Order,
@@ -66,7 +66,7 @@ impl Default for WalkOptions<'_> {
     }
 }
 
-/// What a walk met.
+/// Report of a walk.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct WalkReport {
     /// Everything in the log, counted.
@@ -91,7 +91,8 @@ pub struct WalkReport {
 /// has: its size and the definitions in its summary).
 ///
 /// # Errors
-/// [`Error::Read`](crate::error::Error::Read) when the input itself fails. Damage is no error: see [`Survey::problems`].
+/// [`Error::Read`](crate::error::Error::Read) when the input itself fails. Damage is no error: see
+/// [`Survey::problems`].
 ///
 /// # Panics
 /// Passes on a panic of `map`.

@@ -29,7 +29,7 @@ pub(super) struct Bench {
     pub(super) met: Met,
 }
 
-/// What all threads of a walk share.
+/// State that all threads of a walk share.
 #[derive(Debug)]
 pub(super) struct Shared<T, D, M> {
     pub(super) table: RwLock<Table<D>>,
@@ -116,7 +116,7 @@ impl<T, D, M> Shared<T, D, M> {
     }
 }
 
-/// What was met in a block, in a form that can be checked and added up.
+/// Results of a block, in a form that can be checked and added up.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     /// Channel ids, what they were taken for, and their messages.
@@ -168,12 +168,12 @@ pub(super) enum Done<T> {
     Walked {
         pieces: Vec<Piece<T>>,
         findings: Findings,
-        /// What ended the pass early, and bytes of the block behind it.
+        /// Fault that ended the pass early, and bytes of the block behind it.
         fault: Option<(ProblemKind, u64)>,
     },
     /// The block can not be used.
     Bad(ProblemKind),
-    /// It changes the table, so it has to be done in file order.
+    /// Block that changes the table, so that it has to be done in file order.
     InOrder,
     /// The file can not be read.
     Failed(io::Error),

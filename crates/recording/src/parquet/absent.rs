@@ -12,14 +12,14 @@ pub(crate) const MAGIC: [u8; 4] = *b"PAR1";
 /// Why a file is no table that is read.
 #[derive(Debug)]
 pub(crate) enum Trouble {
-    /// It can not be read.
+    /// Failure to read it.
     #[expect(dead_code, reason = "nothing is read of it")]
     Read(io::Error),
-    /// What is wrong with it.
+    /// Refusal of its contents.
     Not(Diagnostic),
 }
 
-/// None there are.
+/// Rows, of which there are none.
 #[derive(Debug)]
 pub struct Rows<S>(Infallible, PhantomData<S>);
 

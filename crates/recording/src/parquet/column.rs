@@ -1,7 +1,7 @@
 //! The pages of a column in a group of rows -> its cells, one after the other. I/O: seeks and reads.
 //!
-//! Apart from the rows because columns are read side by side, each at a page of its own: a page that can not be read costs its
-//! rows, and no more than those.
+//! Apart from the rows because columns are read side by side, each at a page of its own: a page that can not be read
+//! costs its rows, and no more than those.
 
 use super::encoding::{Bytes, Values, differences, plain, runs, texts};
 use super::footer::{Chunk, Leaf, Meaning, Stored};
@@ -21,7 +21,7 @@ const HEADERS: [u64; 2] = [4 << 10, 4 << 20];
 pub(super) struct Column {
     leaf: Leaf,
     codec: i64,
-    /// Where its next page begins, and its last one ends.
+    /// Offset of its next page, and end of its last one.
     next: u64,
     end: u64,
     /// Rows of which no page was read.
@@ -37,7 +37,7 @@ pub(super) struct Column {
 struct Page {
     rows: u64,
     row: u64,
-    /// Which rows have a value, where not all do.
+    /// Presence of a value in each row, where not all have one.
     is_there: Option<Vec<bool>>,
     values: Option<Values>,
     value: usize,
@@ -109,7 +109,8 @@ impl Column {
         Ok(None)
     }
 
-    /// Takes the next page, which may take so much memory; where there is none to be had, the rows that are left are lost.
+    /// Takes the next page, which may take so much memory; where there is none to be had, the rows that are left are
+    /// lost.
     ///
     /// # Errors
     /// The file can not be read.
@@ -304,7 +305,7 @@ fn quoted(out: &mut Vec<u8>, text: &[u8]) {
     out.push(b'"');
 }
 
-/// At most so many bytes from there on.
+/// Reads at most so many bytes from there on.
 pub(super) fn read_at(source: &mut (impl Read + Seek), at: u64, count: u64) -> io::Result<Vec<u8>> {
     source.seek(SeekFrom::Start(at))?;
     let mut bytes = Vec::new();

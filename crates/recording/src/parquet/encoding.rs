@@ -1,7 +1,7 @@
 //! The values of a page -> numbers. Pure.
 //!
-//! Apart from the pages because this is arithmetic on bits: each encoding is told how many values there have to be, and gives
-//! as many or says why not.
+//! Apart from the pages because this is arithmetic on bits: each encoding is told how many values there have to be,
+//! and gives as many or says why not.
 //!
 //! # Source
 //! apache/parquet-format, `Encodings.md`.
@@ -21,7 +21,7 @@ pub(super) enum Values {
 const MOST_TEXT: usize = 64 << 20;
 /// Values of a block of differences.
 const MOST_BLOCK: u64 = 1 << 16;
-/// From 1970 to the day that days of INT96 are counted from.
+/// Days from the day that days of INT96 are counted from to 1970.
 const JULIAN_1970: i64 = 2_440_588;
 const DAY_NANOS: i64 = 86_400_000_000_000;
 
@@ -275,7 +275,7 @@ impl Values {
         }) as u64
     }
 
-    /// Those at these places.
+    /// Values at the indices.
     pub(super) fn at(&self, places: &[u32]) -> Result<Values, String> {
         fn picked<T: Clone>(all: &[T], places: &[u32]) -> Result<Vec<T>, String> {
             let each = places.iter().map(|place| all.get(*place as usize).cloned());

@@ -1,7 +1,7 @@
 //! The footer of a Parquet file -> its columns, and where their pages are. Pure.
 //!
-//! Apart from the pages because everything is decided here: which columns there are and what their numbers mean, before a
-//! byte of them is read.
+//! Apart from the pages because everything is decided here: which columns there are and what their numbers mean,
+//! before a byte of them is read.
 //!
 //! # Source
 //! apache/parquet-format, `src/main/thrift/parquet.thrift`.
@@ -11,7 +11,7 @@ use super::thrift::{Bad, Fields, Kind};
 /// Columns that are looked at.
 const MOST_COLUMNS: usize = 4096;
 
-/// How a value is stored.
+/// Physical type of a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Stored {
     Boolean,
@@ -22,42 +22,42 @@ pub(super) enum Stored {
     Float,
     Double,
     Bytes,
-    /// Of this length.
+    /// Bytes of this length.
     Fixed(usize),
 }
 
-/// What a number means.
+/// Logical meaning of a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Meaning {
     Plain,
     Unsigned,
     /// A time, counted in this unit.
     Time(&'static str),
-    /// None of ours: decimals, half floats, dates.
+    /// Meaning that is none of ours: decimals, half floats, dates.
     Other,
 }
 
 /// A leaf of the schema.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Leaf {
-    /// Its path, with points between.
+    /// Path, with points between.
     pub(super) name: String,
     pub(super) stored: Stored,
     pub(super) meaning: Meaning,
     /// The level at which a value is there.
     pub(super) levels: u32,
-    /// It is a list, or in one.
+    /// Whether it is a list, or in one.
     pub(super) is_repeated: bool,
 }
 
-/// Where the pages of a column are, in a group of rows.
+/// Place of the pages of a column, in a group of rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Chunk {
     pub(super) codec: i64,
     pub(super) values: u64,
     pub(super) offset: u64,
     pub(super) length: u64,
-    /// It is in another file, or encrypted.
+    /// Whether it is in another file, or encrypted.
     pub(super) is_elsewhere: bool,
 }
 
@@ -68,16 +68,16 @@ pub(super) struct Group {
     pub(super) chunks: Vec<Chunk>,
 }
 
-/// What a footer says.
+/// Contents of a footer.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct Footer {
     pub(super) leaves: Vec<Leaf>,
     pub(super) groups: Vec<Group>,
     /// Whether strapd wrote it.
     pub(super) is_own: bool,
-    /// What its samples mean, where strapd wrote them.
+    /// Kind of its samples, where strapd wrote them.
     pub(super) sample_kind: Option<String>,
-    /// In which world its attitudes are, where strapd wrote them.
+    /// World of its attitudes, where strapd wrote them.
     pub(super) world: Option<String>,
 }
 

@@ -1,7 +1,7 @@
-//! What stands before a page -> what the page is. Pure.
+//! Header of a page -> what the page is. Pure.
 //!
-//! Apart from the pages because nothing of it is believed: where the body is, and how much of it there is, is checked by whoever
-//! reads it.
+//! Apart from the pages because nothing of it is believed: where the body is, and how much of it there is, is checked
+//! by whoever reads it.
 
 use super::thrift::{Bad, Fields, Kind};
 
@@ -9,7 +9,7 @@ pub(super) const DATA: i64 = 0;
 pub(super) const DICTIONARY: i64 = 2;
 pub(super) const DATA_2: i64 = 3;
 
-/// What stands before a page.
+/// Header of a page.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub(super) struct Header {
     pub(super) kind: i64,

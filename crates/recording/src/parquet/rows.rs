@@ -1,6 +1,7 @@
 //! A Parquet file -> the rows of a table, as text. I/O: seeks and reads.
 //!
-//! A stage of its own, and text again, because what a column means, in which unit, and what is refused is decided for rows of
+//! A stage of its own, and text again, because what a column means, in which unit, and what is refused is decided for
+//! rows of
 //! text already: a table says the same whichever way it is stored. Numbers have the fewest digits that are their bits.
 
 use super::MAGIC;
@@ -26,9 +27,9 @@ const AHEAD: usize = 1 << 16;
 /// Why a file is no table that is read.
 #[derive(Debug)]
 pub(crate) enum Trouble {
-    /// It can not be read.
+    /// Failure to read it.
     Read(io::Error),
-    /// What is wrong with it.
+    /// Refusal of its contents.
     Not(Diagnostic),
 }
 
@@ -38,10 +39,10 @@ pub struct Rows<S> {
     /// The place of each column, of those that are read.
     read: Vec<Option<Leaf>>,
     delimiter: u8,
-    /// What stands at the end of each row.
+    /// Text at the end of each row.
     behind: String,
     groups: std::vec::IntoIter<Group>,
-    /// Where the footer begins.
+    /// Offset of the footer.
     end: u64,
     now: Vec<Option<Column>>,
     left: u64,

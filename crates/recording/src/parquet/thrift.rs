@@ -11,13 +11,13 @@ const MOST_DEEP: u32 = 32;
 /// Why bytes are none of this protocol.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Bad {
-    /// They end too early: more may help.
+    /// Early end: more may help.
     Short,
-    /// They say what can not be.
+    /// Values that cannot be.
     Wrong,
 }
 
-/// What a field holds.
+/// Kind of a field.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Kind {
     True,
@@ -67,8 +67,8 @@ impl<'b> Fields<'b> {
         self.at
     }
 
-    /// Reads a structure: `take` gets the number and the kind of each of its fields, and says whether it read it; what it
-    /// did not is stepped over.
+    /// Reads a structure: `take` gets the number and the kind of each of its fields, and says whether it read it;
+    /// what it did not is stepped over.
     pub(super) fn each(
         &mut self,
         mut take: impl FnMut(i64, Kind, &mut Self) -> Result<bool, Bad>,
@@ -135,7 +135,7 @@ impl<'b> Fields<'b> {
         Ok(bytes)
     }
 
-    /// How many elements a list has, and of which kind. Each takes a byte at least.
+    /// Number of elements of a list, and their kind. Each takes a byte at least.
     pub(super) fn list(&mut self) -> Result<(usize, Kind), Bad> {
         let head = self.byte()?;
         let count = match head >> 4 {
@@ -216,7 +216,7 @@ impl<'b> Fields<'b> {
         }
     }
 
-    /// Of lists and maps a truth value takes a byte.
+    /// Skips an element; of lists and maps a truth value takes a byte.
     fn skip_element(&mut self, kind: Kind, depth: u32) -> Result<(), Bad> {
         match kind {
             Kind::True | Kind::False => self.byte().map(|_| ()),

@@ -5,7 +5,7 @@
 use super::is_plain;
 use crate::text::printable;
 
-/// What begins an entry of the directory at an archive's end, and its length without names.
+/// Mark of an entry of the directory at an archive's end, and its length without names.
 const ENTRY: &[u8] = b"PK\x01\x02";
 const ENTRY_LEN: usize = 46;
 
@@ -67,7 +67,7 @@ fn members(last: &[u8]) -> Vec<String> {
 /// The least of a member that is a log whole.
 const LOG: u8 = 3;
 
-/// How likely a member is the one that is meant; `None` for what can be none.
+/// Likelihood that a member is the one that is meant; `None` for what can be none.
 fn likely(name: &str) -> Option<u8> {
     let name = name.to_ascii_lowercase();
     let own = name.rsplit('/').next().unwrap_or(&name);

@@ -1,12 +1,12 @@
 //! A rate and a force -> the message ROS 2 has for them. Pure.
 //!
-//! Apart from the containers because several have samples in layouts of their own: told as this, viewers of an MCAP made
-//! of them read them, too.
+//! Apart from the containers because several have samples in layouts of their own: told as this, viewers of an MCAP
+//! made of them read them, too.
 
 /// The type.
 pub(crate) const TYPE: &str = "sensor_msgs/msg/Imu";
 
-/// What is marked as absent, by its covariance.
+/// Covariance that marks a field as absent.
 const ABSENT: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
 /// Writes a CDR message in place of what is in `out`: stamp in ns, rate in rad/s, force in m/s^2, no orientation.

@@ -1,4 +1,4 @@
-//! What another container holds -> the records MCAP has for it. Pure.
+//! Contents of another container -> the records MCAP has for it. Pure.
 //!
 //! A stage of its own so that ULog and bags need no second way through the house: their readers write schemas,
 //! channels and messages here, and what follows (definitions, workers, order, counting) can not tell.
@@ -11,12 +11,12 @@ pub(crate) struct Transcript {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// What became of the bytes that a reader of another container was given.
+/// Outcome for the bytes that a reader of another container was given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
-    /// So many were used.
+    /// Number of bytes that were used.
     Used(usize),
-    /// None, and so many are needed.
+    /// Number of bytes that are needed; none were used.
     Need(usize),
 }
 
@@ -66,7 +66,7 @@ impl Transcript {
         });
     }
 
-    /// What stands where a message was, and can not be read.
+    /// Stands for a message that cannot be read.
     pub(crate) fn unreadable(&mut self) {
         self.record(op::MESSAGE, |_| {});
     }

@@ -1,4 +1,5 @@
-//! A database -> channels, then messages in the order of their numbers, and what was wrong. Pure, but for who has the pages.
+//! A database -> channels, then messages in the order of their numbers, and what was wrong. Pure, but for who has the
+//! pages.
 //!
 //! Apart from the tables because it alone decides what a lost page costs: leaves below it are looked for among all
 //! pages, once, and read in its place.
@@ -13,7 +14,7 @@ use crate::sqlite::{
 use std::collections::BTreeMap;
 use std::io;
 
-/// What was wrong, and on which page.
+/// Fault, and its page.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Fault {
     pub(crate) page: u32,
@@ -22,7 +23,7 @@ pub(crate) struct Fault {
     pub(crate) messages: Option<u64>,
 }
 
-/// What can be wrong with a recording.
+/// Kind of a fault in a recording.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum FaultKind {
     /// Fewer pages are there than the database says that it has.
@@ -33,7 +34,7 @@ pub(crate) enum FaultKind {
     Page { page: u32, why: &'static str },
     /// A row that can not be read, or is no message.
     Row { why: &'static str },
-    /// There is no such table.
+    /// Missing table.
     NoTable { name: &'static str },
     /// Definitions beyond the limits, or more leaves than are looked for.
     TooMany,
@@ -225,7 +226,7 @@ impl Bag {
         self.table.page()
     }
 
-    /// How many rows a leaf has between these numbers, by those of its neighbours.
+    /// Number of rows that a leaf has between these numbers, by those of its neighbours.
     fn rows_of_a_leaf(&self, (low, high): (i64, i64)) -> Option<u64> {
         let low = low.max(0);
         let rows = u64::try_from(high.checked_sub(low)?).ok()?;
@@ -253,7 +254,7 @@ impl Bag {
         Ok(())
     }
 
-    /// Behind the last leaf: those that no tree reaches, where something is wrong.
+    /// Sweeps, behind the last leaf, those that no tree reaches, where something is wrong.
     fn sweep(&mut self, pages: &mut dyn Pages) -> io::Result<bool> {
         if self.is_swept || !(self.is_damaged || self.is_open) {
             return Ok(false);

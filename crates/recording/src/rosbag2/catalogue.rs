@@ -1,7 +1,7 @@
 //! All pages of a damaged database -> leaves with messages that no tree reaches. Pure, but for who has the pages.
 //!
-//! Apart from the walk because it is made once, when the first page is lost, and looked at again and again: a page above
-//! hundreds of leaves costs none of their rows.
+//! Apart from the walk because it is made once, when the first page is lost, and looked at again and again: a page
+//! above hundreds of leaves costs none of their rows.
 
 use crate::sqlite::{Header, Page, Pages, Seen};
 use std::collections::BTreeSet;

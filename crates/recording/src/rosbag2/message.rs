@@ -14,7 +14,7 @@ const UNPACKED: (u64, u64) = (1000, 1 << 20);
 /// What may come to that for all messages together: of half a megabyte, ten thousand would be unpacked.
 pub(super) const SPARE: u64 = 256 << 20;
 
-/// Where the columns stand in a row.
+/// Indices of the columns in a row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Places {
     pub(super) topic: usize,
@@ -23,7 +23,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// As rosbag2 makes the table.
+    /// Table as rosbag2 makes it.
     pub(super) const USUAL: Places = Places {
         topic: 1,
         time: 2,
@@ -31,7 +31,7 @@ impl Places {
     };
 }
 
-/// What reads messages.
+/// Reader of messages.
 #[derive(Debug)]
 pub(super) struct Messages {
     pub(super) places: Places,

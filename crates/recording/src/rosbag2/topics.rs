@@ -14,7 +14,7 @@ const MOST: usize = u16::MAX as usize;
 /// Longest row of them, bytes: the longest definitions in use take a hundredth of that.
 const LONGEST: u64 = 4 << 20;
 
-/// What reads the small tables.
+/// Reader of the small tables.
 pub(super) struct Small<'p> {
     pub(super) pages: &'p mut dyn Pages,
     pub(super) seen: &'p mut Seen,

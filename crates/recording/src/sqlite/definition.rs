@@ -1,6 +1,7 @@
 //! The table of tables -> where each begins, and what its columns are called. Pure, but for who has the pages.
 //!
-//! Apart from the rows because columns are found by name: makers add some, and those that are read need not stand first.
+//! Apart from the rows because columns are found by name: makers add some, and those that are read need not stand
+//! first.
 
 use super::table::{Found, Table};
 use super::{Encoding, Pages, Seen};
@@ -24,7 +25,7 @@ pub(crate) struct Definition {
 }
 
 impl Definition {
-    /// Where the values of a column stand in a row.
+    /// Index of the values of a column in a row.
     pub(crate) fn column(&self, name: &str) -> Option<usize> {
         let is_it = |known: &String| known.eq_ignore_ascii_case(name);
         self.columns.iter().position(is_it)
@@ -116,7 +117,7 @@ fn columns(sql: &str) -> Vec<String> {
     names
 }
 
-/// What stands between the commas of the outermost brackets, which are open already.
+/// Parts between the commas of the outermost brackets, which are open already.
 fn parts(inner: &str) -> Vec<&str> {
     let (mut found, mut from, mut depth) = (Vec::new(), 0, 0_usize);
     let mut quote = None;

@@ -10,7 +10,7 @@ pub(crate) const HEADER: usize = 100;
 /// Least bytes of a page that may be used, by the format.
 const LEAST_USABLE: u32 = 480;
 
-/// How texts are stored.
+/// Encoding of texts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Encoding {
     Utf8,
@@ -18,14 +18,14 @@ pub(crate) enum Encoding {
     Utf16Big,
 }
 
-/// What is asked of the header.
+/// Fields asked of the header.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Header {
     /// Bytes of a page: a power of two, 512 to 65,536.
     pub(crate) page_size: u32,
     /// Bytes of a page that hold cells.
     pub(crate) usable: u32,
-    /// How many pages there are, where the last writer knew to say so.
+    /// Number of pages, where the last writer knew to state it.
     pub(crate) pages: Option<u32>,
     /// The first page of the list of those that are free; 0 for none.
     pub(crate) free: u32,

@@ -3,7 +3,7 @@
 //! Apart from the tree because a page is judged by itself: all that it says of where its cells lie is held against its
 //! size.
 
-/// What the page of a table is.
+/// Kind of a page of a table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     /// Numbers of other pages.
@@ -15,9 +15,9 @@ pub(crate) enum Kind {
 /// A page of the tree of a table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Page<'a> {
-    /// Its usable bytes.
+    /// Usable bytes.
     bytes: &'a [u8],
-    /// Where its own header begins: behind that of the database on page 1.
+    /// Offset of its own header: behind that of the database on page 1.
     head: usize,
     pub(crate) kind: Kind,
     pub(crate) cells: usize,
@@ -29,7 +29,7 @@ pub(crate) struct Cell<'a> {
     pub(crate) rowid: i64,
     /// Bytes of the row.
     pub(crate) length: u64,
-    /// Those that lie here.
+    /// Bytes of the payload on this page, not on overflow pages.
     pub(crate) local: &'a [u8],
     /// The page with those that follow; 0 for none.
     pub(crate) overflow: u32,
@@ -87,7 +87,7 @@ impl<'a> Page<'a> {
         Ok(page)
     }
 
-    /// Where the places of the cells begin.
+    /// Offset of the places of the cells.
     fn pointers(&self) -> usize {
         match self.kind {
             Kind::Interior => self.head + 12,
@@ -95,7 +95,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Where a cell begins.
+    /// Offset of a cell.
     pub(crate) fn place(&self, nth: usize) -> Option<usize> {
         let at = self.pointers() + 2 * nth;
         let place = self.bytes.get(at..).and_then(<[u8]>::first_chunk)?;

@@ -93,7 +93,7 @@ impl<'a> Iterator for Row<'a> {
     }
 }
 
-/// At most eight bytes, the greatest first, with a sign.
+/// Reads at most eight bytes, the greatest first, with a sign.
 #[inline]
 fn integer(bytes: &[u8]) -> i64 {
     if let Ok(whole) = <[u8; 8]>::try_from(bytes) {

@@ -1,7 +1,7 @@
 //! Numbers of pages -> which were used. Pure.
 //!
-//! Apart because it is what keeps the work in bounds: a page belongs to one place of one tree, so the second that names it
-//! is wrong, and no circle can be walked.
+//! Apart because it is what keeps the work in bounds: a page belongs to one place of one tree, so the second that
+//! names it is wrong, and no circle can be walked.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// For pages up to this number.
+    /// Makes one for pages up to this number.
     pub(crate) fn up_to(pages: u32) -> Seen {
         Seen {
             words: BTreeMap::new(),

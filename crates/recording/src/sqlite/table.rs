@@ -18,8 +18,8 @@ pub(crate) struct Table {
     leaf: Vec<u8>,
     next: usize,
     cells: usize,
-    /// Where rows of the leaf lie, and the number of each in it, to see a place that is named twice; `are_apart` where none
-    /// is.
+    /// Places of rows in the leaf, and the number of each in it, to see a place that is named twice; `are_apart`
+    /// where none is.
     places: Vec<(usize, usize)>,
     are_apart: bool,
     /// A row that lies in several pages.
@@ -29,7 +29,7 @@ pub(crate) struct Table {
     longest: u64,
 }
 
-/// What comes next.
+/// Item that comes next.
 #[derive(Debug)]
 pub(crate) enum Found<'a> {
     Row {

@@ -34,7 +34,7 @@ struct Level {
     rows: Span,
 }
 
-/// What comes next.
+/// Step that comes next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
     /// A leaf, whose bytes were copied.

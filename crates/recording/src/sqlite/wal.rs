@@ -28,9 +28,9 @@ pub(crate) struct Frame {
 /// Why a frame is none.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum NoFrame {
-    /// It is of an earlier use of the file: what follows, too.
+    /// Frame of an earlier use of the file: what follows is, too.
     Old,
-    /// It belongs here, and is not what was written.
+    /// Frame that belongs here, and is not what was written.
     Damaged,
 }
 

@@ -22,19 +22,19 @@ pub(super) struct Format {
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Field {
     kind: String,
-    /// How many, when it is an array.
+    /// Length, when it is an array.
     many: Option<u16>,
     name: String,
 }
 
-/// How the messages of a format lie, once every format it names is known.
+/// Layout of the messages of a format, once every format it names is known.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Layout {
     /// Bytes of a message without the padding at its end, which loggers leave out.
     pub(super) least: usize,
     /// Bytes of a message.
     pub(super) size: usize,
-    /// Where its time lies: a `uint64_t timestamp`, in us.
+    /// Offset of its time: a `uint64_t timestamp`, in us.
     pub(super) timestamp: Option<usize>,
 }
 

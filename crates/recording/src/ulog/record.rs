@@ -11,10 +11,10 @@ pub(super) const HEAD: usize = 3;
 /// Longest record, with its head.
 pub(super) const LONGEST: usize = HEAD + u16::MAX as usize;
 
-/// What a synchronisation record holds.
+/// Contents of a synchronisation record.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
-/// How much of a text is looked at: the marks of a record must cost the same however long it is.
+/// Number of bytes of a text that are looked at: the marks of a record must cost the same however long it is.
 const LOOK: usize = 64;
 
 /// Length of the body and type, where there are as many bytes.
@@ -23,20 +23,20 @@ pub(super) fn head(data: &[u8]) -> Option<(usize, u8)> {
     Some((usize::from(u16::from_le_bytes([low, high])), kind))
 }
 
-/// What a record looks like.
+/// Look of a record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Look {
-    /// Its body has the marks of its type.
+    /// Body with the marks of its type.
     Whole,
     /// A message of a kind that nothing has defined.
     Unknown(u16),
     /// A type this program does not know; which is stepped over if what follows is a record.
     Strange,
-    /// Of a known type, without its marks.
+    /// Known type, without its marks.
     Wrong,
 }
 
-/// What the record of this type and body looks like; `layout` is that of the messages of an id.
+/// Look of the record of this type and body; `layout` is that of the messages of an id.
 pub(super) fn look(kind: u8, body: &[u8], layout: impl Fn(u16) -> Option<Layout>) -> Look {
     let whole = match kind {
         b'D' => match id(body) {

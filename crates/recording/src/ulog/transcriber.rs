@@ -25,17 +25,17 @@ const WINDOW: usize = (CHAIN + BETWEEN) * LONGEST;
 /// Most bytes of a name in what a log says about itself.
 const MAX_SAID: usize = 100;
 
-/// What was wrong, and where.
+/// Fault, and its place.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Fault {
     pub(crate) offset: u64,
     pub(crate) kind: FaultKind,
 }
 
-/// What can be wrong with a log.
+/// Kind of a fault in a log.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum FaultKind {
-    /// It ends inside a record.
+    /// End inside a record.
     Cut { need: u64, have: u64 },
     /// Bytes that are no record.
     Garbage { skipped: u64 },
@@ -54,7 +54,7 @@ pub(crate) enum FaultKind {
 /// A log under way.
 #[derive(Debug, Default)]
 pub(crate) struct Transcriber {
-    /// Where the next record begins in the file.
+    /// Offset of the next record in the file.
     at: u64,
     formats: Formats,
     /// Bytes of schemas told so far, and the number of the last.
@@ -64,12 +64,12 @@ pub(crate) struct Transcriber {
     schemas: BTreeMap<String, u16>,
     steps: usize,
     kinds: BTreeMap<u16, Kind>,
-    /// Where data begin that a later write appended, behind a record that may be cut.
+    /// Offsets of data that a later write appended, behind a record that may be cut.
     appended: Vec<u64>,
     /// Records without their marks whose place was lost: from here on nothing was found yet.
     lost: Option<u64>,
     time: u64,
-    /// What the log says about its system: `sys_name`, `ver_hw`, `ver_sw`.
+    /// Facts that the log states about its system: `sys_name`, `ver_hw`, `ver_sw`.
     said: BTreeMap<&'static str, String>,
     pub(crate) faults: Vec<Fault>,
 }

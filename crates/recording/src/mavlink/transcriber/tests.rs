@@ -4,7 +4,7 @@
 use super::*;
 use crate::records::{HEAD, head_at, op};
 
-/// As the protocol's own implementations have it, bit by bit.
+/// Checksum as the protocol's own implementations have it, bit by bit.
 fn checksum(bytes: &[u8]) -> u16 {
     let mut sum = 0xffff_u16;
     for byte in bytes {

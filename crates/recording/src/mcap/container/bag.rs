@@ -17,7 +17,7 @@ use crate::records::{HEAD, head_at};
 use std::io;
 use std::sync::Arc;
 
-/// What is read to see a record's head and those that follow.
+/// Number of bytes read to see a record's head and those that follow.
 const PEEK: usize = 4 << 10;
 /// Bytes searched at first, and at most at a time: where chunks and garbage take turns, the next chunk is near.
 const FIRST: usize = 4 << 10;
@@ -39,7 +39,7 @@ pub(in super::super) struct Scanner {
     told: (u32, u64),
 }
 
-/// What a head says that is kept while the tape moves on.
+/// Fields of a head that are kept while the tape moves on.
 struct Kept {
     op: u8,
     total: u64,
@@ -348,7 +348,7 @@ impl Scanner {
         Ok(())
     }
 
-    /// What stands at `at` is no record, or goes on behind the end: find the next chunk, or end.
+    /// Handles bytes at `at` that are no record, or go on behind the end: finds the next chunk, or ends.
     fn lost(&mut self, at: u64, total: u64) -> io::Result<()> {
         self.tape.skip(1)?;
         let mut window = FIRST;

@@ -33,13 +33,13 @@ pub(in super::super) struct Scanner {
     problems: Problems,
     /// The payload itself.
     bytes: Vec<u8>,
-    /// Where the payload told last lies.
+    /// Position of the payload given last.
     position: u64,
     /// Bytes of all payloads so far: each byte of the file belongs to one.
     read: u64,
 }
 
-/// Where payloads come from.
+/// Source of payloads.
 #[derive(Debug)]
 enum Source {
     /// Not looked at yet.
@@ -260,7 +260,7 @@ impl Scanner {
         Ok(())
     }
 
-    /// No device begins here that can be read: the end, or what is skipped up to the next.
+    /// Searches where no device begins that can be read: the end, or what is skipped up to the next.
     fn search(
         &mut self,
         file: &LogFile,
@@ -282,7 +282,7 @@ impl Scanner {
     }
 }
 
-/// Where the next device begins, from a place on.
+/// Offset of the next device, from a place on.
 fn find(file: &LogFile, from: u64) -> io::Result<Option<u64>> {
     let mut at = from;
     let mut size = FIRST;

@@ -22,21 +22,21 @@ const BEYOND: &str =
 pub(super) struct FilePages {
     file: Arc<LogFile>,
     beside: Option<Arc<LogFile>>,
-    /// Where in the file beside a page's bytes begin.
+    /// Offsets in the file beside at which a page's bytes begin.
     committed: BTreeMap<u32, u64>,
     page_size: u32,
     usable: usize,
     /// Pages in the database itself.
     own: u32,
     count: u32,
-    /// What was read ahead, and where it begins.
+    /// Bytes read ahead, and their offset.
     window: Vec<u8>,
     window_at: u64,
     /// Bytes to read where the next page is not in the window.
     ahead: usize,
 }
 
-/// What was wrong with the file beside.
+/// Fault of the file beside.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct WalFault {
     pub(super) offset: u64,
@@ -163,7 +163,7 @@ impl FilePages {
         Ok(pages)
     }
 
-    /// Where a page begins in the file.
+    /// Offset of a page in the file.
     pub(super) fn offset(&self, page: u32) -> u64 {
         u64::from(page.saturating_sub(1)) * u64::from(self.page_size)
     }

@@ -1,7 +1,7 @@
 //! The files of a recording of ROS 2 in SQLite -> blocks of records. I/O.
 //!
-//! Apart from [`crate::rosbag2`], which does the work and knows no files. A database is read in the order of its tables,
-//! not of its bytes, so a stream of one was put into a file before it comes here.
+//! Apart from [`crate::rosbag2`], which does the work and knows no files. A database is read in the order of its
+//! tables, not of its bytes, so a stream of one was put into a file before it comes here.
 
 use super::super::block::{Block, Payload};
 use super::super::input::{Input, LogFile};
@@ -23,13 +23,13 @@ const SPARE: usize = 8;
 /// The walk over a recording.
 #[derive(Debug)]
 pub(in super::super) struct Scanner {
-    /// What is to be opened: the database, and the files beside it.
+    /// Files to be opened: the database, and those beside it.
     files: Option<(Arc<LogFile>, Beside)>,
     limits: Limits,
     open: Option<(FilePages, Bag)>,
     problems: Problems,
     distribution: String,
-    /// Where the records told last lie in the file.
+    /// Position in the file of the records given last.
     position: u64,
     spare: Vec<Vec<u8>>,
 }

@@ -16,7 +16,7 @@ fn batch(times: &[u64], from: usize) -> Batch<Item> {
     batch
 }
 
-/// What comes out, and how many of it late, when these blocks go in.
+/// Items that come out, and how many of them late, when these blocks go in.
 fn run(blocks: &[Vec<u64>], lookahead: Lookahead) -> (Vec<Item>, u64) {
     let mut merger = Merger::new(lookahead);
     let (mut out, mut from) = (Vec::new(), 0);

@@ -13,7 +13,7 @@ use crate::records::{HEAD, head_at};
 use std::io;
 use std::sync::Arc;
 
-/// What is read ahead where chunks are small, so that one read serves many ...
+/// Number of bytes read ahead where chunks are small, so that one read serves many ...
 const PEEK_SMALL: usize = 256 << 10;
 /// ... which is when a chunk is shorter than this.
 const SMALL: u64 = 32 << 10;

@@ -50,7 +50,7 @@ pub(super) struct Course<'w, T, D, M> {
     pub(super) least: usize,
     pub(super) hand_over: usize,
     pub(super) items: u64,
-    /// What is left out by an index.
+    /// Parts left out by an index.
     pub(super) passed: Option<PassedOver>,
     pub(super) name: PathBuf,
 }
