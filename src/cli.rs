@@ -69,7 +69,7 @@ pub struct Cli {
     /// Flags every command takes.
     #[command(flatten)]
     pub global: Global,
-    /// What to do.
+    /// Command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -125,10 +125,10 @@ pub struct Global {
     pub threads: usize,
 }
 
-/// When to use colour.
+/// Use of colour.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
-    /// On a terminal, unless `NO_COLOR` is set.
+    /// Colour on a terminal, unless `NO_COLOR` is set.
     Auto,
     /// Always.
     Always,
@@ -167,7 +167,7 @@ pub enum Command {
     Config(config::Config),
     /// Calibrate a sensor from recordings of it: bias, scale, axes, as a file
     Calibrate(Box<calibrate::Calibrate>),
-    /// What a log holds: topics, rates, clocks, frames, and what to do next
+    /// Topics, rates, clocks and frames of a log, and what to do next
     Info(info::Info),
     /// Everything that may spoil the attitude from a log, with the flag that helps
     Check(check::Check),
@@ -195,7 +195,7 @@ pub enum Command {
     Man(manual::Man),
 }
 
-/// How a run that was carried out ended.
+/// Outcome of a run that was carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Everything asked for was done.
@@ -209,7 +209,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// That of several: one that failed comes before what was lost.
+    /// Outcome of several: one that failed comes before what was lost.
     fn and(self, other: Outcome) -> Outcome {
         match (self, other) {
             (Outcome::Failed, _) | (_, Outcome::Failed) => Outcome::Failed,
@@ -251,7 +251,7 @@ impl From<Outcome> for ExitCode {
 
 #[cfg(feature = "object-store")]
 impl Cli {
-    /// With the recordings that patterns in addresses mean, in the commands that take several.
+    /// Replaces patterns in addresses by the recordings that they mean, in the commands that take several.
     fn with_patterns(mut self) -> Result<Cli> {
         use std::mem::take;
         match &mut self.command {

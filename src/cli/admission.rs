@@ -1,4 +1,4 @@
-//! Who may connect, as flags. I/O: reads the token file.
+//! Flags of who may connect. I/O: reads the token file.
 
 use crate::error::Result;
 use crate::serve::Settings;
@@ -33,7 +33,7 @@ pub struct Admission {
 }
 
 impl Admission {
-    /// These settings, and who may connect.
+    /// Applies them to these settings.
     ///
     /// # Errors
     /// The token file can not be read, or holds none.

@@ -40,22 +40,22 @@ pub struct Allan {
     /// IMU topic; needed only when a log has several
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Where a value lies in the message: ROLE=PATH, as in replay
+    /// Path of a value in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
     /// Use a gyro whose covariance is marked -1 (absent) all the same
     #[arg(long)]
     pub ignore_covariance_flag: bool,
-    /// Which clock the samples are placed on; `index` needs --rate-hz
+    /// Clock on which the samples are placed; `index` needs --rate-hz
     #[arg(long, value_enum, default_value = "header", env = "STRAPD_TIME")]
     pub time: TimeArg,
     /// Sample rate for --time index
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate_hz: Option<f64>,
-    /// What a sample means in time [default: rate, unless the format says otherwise]
+    /// Meaning of a sample in time [default: rate, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
     pub sample_kind: Option<KindArg>,
     /// Unit of the recorded rates [default: rad, unless the format says otherwise]

@@ -42,7 +42,7 @@ pub struct Calibrate {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
     /// Replace a file that exists
@@ -164,7 +164,7 @@ impl Calibrate {
     }
 }
 
-/// What one recording tells, and whether samples of it were lost.
+/// Results of one recording, and whether samples of it were lost.
 fn learned(
     global: &Global,
     log: &str,

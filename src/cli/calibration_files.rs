@@ -17,12 +17,12 @@ const MAX_BYTES: u64 = 1 << 16;
 /// Most files of a folder.
 const MOST_FILES: usize = 4096;
 
-/// What `--calibration` names.
+/// Calibrations that `--calibration` names.
 #[derive(Debug)]
 pub(super) enum Calibrations {
-    /// That of every sensor there is.
+    /// Calibration of every sensor there is.
     One(Arc<SensorCalibration>),
-    /// Those of sensors by their names.
+    /// Calibrations of sensors by their names.
     Each(BTreeMap<String, Arc<SensorCalibration>>),
 }
 

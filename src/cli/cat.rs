@@ -40,10 +40,10 @@ pub struct Cat {
     /// Topic; the IMU topic by default
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Where a value lies in the message: ROLE=PATH, as in replay
+    /// Path of a value in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
     /// Form of the output
@@ -58,7 +58,7 @@ pub struct Cat {
     /// Only this sensor. May be given several times
     #[arg(long = "id", value_name = "NAME", help_heading = "Daemon")]
     pub ids: Vec<String>,
-    /// At most so many attitudes a second of each sensor
+    /// Largest number of attitudes a second of each sensor
     #[arg(long, value_name = "HZ", value_parser = seconds, help_heading = "Daemon")]
     pub rate_hz: Option<f64>,
     /// The token the daemon asks for is in this file (first line, mode 0600)

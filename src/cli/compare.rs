@@ -46,7 +46,7 @@ pub struct Compare {
     /// Topic or id of the reference
     #[arg(long, value_name = "NAME")]
     pub ref_topic: Option<String>,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
     /// Constant rotation of the world to remove first: none, first (equal at the first common
@@ -164,7 +164,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What the errors say beside their size.
+/// Text about the errors beside their size.
 struct Told {
     /// Whether they lie within what the estimate says of them; `None` where it says nothing.
     sigma: Option<Consistency>,
@@ -260,7 +260,7 @@ fn chart(estimate: &[Stamped], reference: Reference<'_>, align: Align, errors: &
     }
 }
 
-/// What is no rotation becomes one with NaN, so that the comparison counts it.
+/// Attitudes of a track. A row that is no rotation becomes one with NaN, so that the comparison counts it.
 fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
     track
         .entries

@@ -24,7 +24,7 @@ const MAX_BYTES: u64 = 1 << 20;
 /// Look at a configuration file of `serve`.
 #[derive(Args, Debug)]
 pub struct Config {
-    /// What to do.
+    /// Action.
     #[command(subcommand)]
     pub action: Action,
 }

@@ -10,7 +10,7 @@ use strapd_attitude::setting::JOIN;
 /// A pause that is none between two files of one recorder, s.
 const AT_ONCE_SECS: f64 = 1.0;
 
-/// What to say, once, of files that continue each other.
+/// Notice, given once, of files that continue each other.
 pub(super) fn said(summaries: &[RunSummary]) -> Option<Diagnostic> {
     let mut parts: Vec<(&RunSummary, &TopicSummary)> = summaries
         .iter()

@@ -36,7 +36,7 @@ const METHODS: [&str; 12] = [
 /// `--world`.
 const WORLDS: [&str; 5] = ["start", "level", "enu", "ned", "nwu"];
 
-/// How the samples are to be understood and integrated.
+/// Settings by which the samples are understood and integrated.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Estimation")]
 pub struct Estimation {
@@ -44,16 +44,16 @@ pub struct Estimation {
     /// `all` = each of them
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Which clock the samples are placed on; `index` needs --rate-hz
+    /// Clock on which the samples are placed; `index` needs --rate-hz
     #[arg(long, value_enum, default_value = "header", env = "STRAPD_TIME")]
     pub time: TimeArg,
     /// Sample rate for --time index
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate_hz: Option<f64>,
-    /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt
+    /// Path of a value in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// How rates become turns. `commit` is that of `serve`: it waits for no later sample, nor for one that was
+    /// Method by which rates become turns. `commit` is that of `serve`: it waits for no later sample, nor for one that was
     /// overtaken
     #[arg(
         long,
@@ -68,11 +68,11 @@ pub struct Estimation {
     /// Order of the Magnus step of --method magnus|causal|commit: 2, 4, 6, 8 or exact
     #[arg(long, value_name = "ORDER")]
     pub order: Option<String>,
-    /// What a sample means in time: the rate at its stamp, the mean over the interval that ends at
+    /// Meaning of a sample in time: the rate at its stamp, the mean over the interval that ends at
     /// its stamp, the integral over it, or the whole rotation in it [default: rate, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
     pub sample_kind: Option<KindArg>,
-    /// What corrects the attitude: auto (gravity where the samples carry a specific force), none (the gyro
+    /// Measurements that correct the attitude: auto (gravity where the samples carry a specific force), none (the gyro
     /// alone), gravity, gravity+mag
     ///
     /// By gravity it is level from the first sample, its tilt does not drift, and the gyro's bias, scale and
@@ -82,7 +82,7 @@ pub struct Estimation {
     /// Topic of the specific force, where it comes in messages of its own
     #[arg(long, value_name = "NAME")]
     pub accel_topic: Option<String>,
-    /// What the accelerometer says at rest: specific force (up, as most do) or kinematic acceleration (down)
+    /// Reading of the accelerometer at rest: specific force (up, as most do) or kinematic acceleration (down)
     #[arg(long, value_enum, default_value = "specific")]
     pub accel_sign: SignArg,
     /// Topic of the magnetic field for --aid gravity+mag, where it comes in messages of its own [default: the
@@ -101,7 +101,7 @@ pub struct Estimation {
         allow_negative_numbers = true
     )]
     pub mag_hard_iron: f64,
-    /// How far magnetic north lies east of true north, in degrees: the heading by --aid gravity+mag is
+    /// Declination: how far magnetic north lies east of true north, in degrees: the heading by --aid gravity+mag is
     /// true then
     #[arg(
         long,
@@ -176,7 +176,7 @@ pub struct Estimation {
         allow_hyphen_values = true
     )]
     pub bias: String,
-    /// What is known of the sensor beforehand: a TOML file, as --save-calibration of replay writes it. It is taken
+    /// Calibration of the sensor: a TOML file, as --save-calibration of replay writes it. It is taken
     /// out first, and its sigmas are where the filter begins. serve: or a folder of such files, each for the
     /// sensor it names
     #[arg(long, value_name = "FILE")]
@@ -233,11 +233,11 @@ pub struct Estimation {
 pub enum TimeArg {
     /// The stamp inside the message.
     Header,
-    /// When it was recorded.
+    /// Time at which it was recorded.
     Log,
-    /// When it was sent.
+    /// Time at which it was sent.
     Publish,
-    /// Its number divided by --rate-hz.
+    /// Number of the sample divided by --rate-hz.
     Index,
 }
 
@@ -465,7 +465,7 @@ impl Estimation {
         Ok(plan)
     }
 
-    /// Which samples, and how messages are read.
+    /// Selection of samples, and how messages are read.
     ///
     /// # Errors
     /// [`Error::Usage`] for a `--field` that is none.

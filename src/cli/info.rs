@@ -17,7 +17,7 @@ use strapd_recording::recording::opened::problems;
 use strapd_recording::recording::topics;
 use strapd_replay::info::Overview;
 
-/// What a log holds: topics, rates, clocks, frames, and what to do next.
+/// Topics, rates, clocks and frames of a log, and what to do next.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd info flight.mcap
@@ -29,10 +29,10 @@ pub struct Info {
     /// Look at this topic too, though it is not obviously an IMU's
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Where a value lies in the message: ROLE=PATH, as in replay
+    /// Path of a value in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
 }

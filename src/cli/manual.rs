@@ -10,7 +10,7 @@ use std::path::PathBuf;
 #[command(after_help = "Example:
   strapd completions bash > ~/.local/share/bash-completion/completions/strapd")]
 pub struct Completions {
-    /// Which shell
+    /// Shell
     #[arg(value_enum)]
     pub shell: clap_complete::Shell,
 }

@@ -25,7 +25,7 @@ Examples:
   strapd model inertia < requests.ndjson > answers.ndjson"
 )]
 pub struct Model {
-    /// Which model
+    /// Model
     #[command(subcommand)]
     pub which: Which,
 }

@@ -1,4 +1,4 @@
-//! Where a long run is: a bar on a terminal, or one JSON object a second. I/O.
+//! Position of a long run: a bar on a terminal, or one JSON object a second. I/O.
 
 use super::{Global, Progress as Mode};
 use crate::pipeline::position::Position;
@@ -25,7 +25,7 @@ enum Show {
 }
 
 impl Reporter {
-    /// As `--progress` and `--quiet` say; the bar only on a terminal.
+    /// Makes one as `--progress` and `--quiet` state; the bar only on a terminal.
     #[must_use]
     pub fn new(global: &Global, name: &str) -> Reporter {
         let mode = match global.progress {

@@ -38,7 +38,7 @@ use strapd_recording::pool::Pool;
 pub struct Replay {
     #[arg(required = true, value_name = "SOURCE", help = super::recordings("Recordings", ", or folders of one"))]
     pub sources: Vec<String>,
-    /// Where the attitude goes: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
+    /// Output for the attitude: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
     /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
     /// {stem} stands for the log's name, and its folder is made, as that of DIR/ is. May be given several times
@@ -51,7 +51,7 @@ pub struct Replay {
     /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
     #[arg(long, help_heading = "Estimation")]
     pub smooth: bool,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
     /// Each SOURCE is a part of one recording: read in the order of their times, the attitude carried across
@@ -87,7 +87,7 @@ pub struct Replay {
         help_heading = "Output"
     )]
     pub out_rate: Option<f64>,
-    /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
+    /// Speed: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
     #[arg(
         long,
         value_name = "FACTOR",
@@ -124,7 +124,7 @@ pub enum CompressionArg {
     Zstd,
     /// lz4.
     Lz4,
-    /// None.
+    /// No compression.
     None,
 }
 
@@ -248,7 +248,7 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
 }
 
 impl Replay {
-    /// What is read by itself: each of the sources, of joined ones the first, which stands for all.
+    /// Sources that are read by themselves: each of them, of joined ones the first, which stands for all.
     fn recordings(&self) -> &[String] {
         match self.join {
             true => self.sources.get(..1).unwrap_or_default(),
@@ -256,7 +256,7 @@ impl Replay {
         }
     }
 
-    /// Where the calibration of a log goes.
+    /// Path for the calibration of a log.
     fn calibration_file(&self, log: &str) -> Option<String> {
         let name = self.save_calibration.as_ref()?;
         Some(name.replace("{stem}", &outputs::stem(log)))
@@ -405,7 +405,7 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
     print(&summary.text())
 }
 
-/// What `--quiet` leaves: why the exit code is 3, and the warnings.
+/// Prints what `--quiet` leaves: why the exit code is 3, and the warnings.
 fn say_warnings(summary: &RunSummary) {
     let source = &summary.source;
     for topic in &summary.topics {

@@ -50,7 +50,7 @@ pub struct Report {
     /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
     #[arg(long, help_heading = "Estimation")]
     pub smooth: bool,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
     /// Hold the attitude against the one in this file (.mcap, .ndjson, .csv), not the one in the log
@@ -168,7 +168,7 @@ fn said(global: &Global, page: &Page<'_>) -> Result<Outcome> {
 }
 
 impl Report {
-    /// What a file is called in the page, which is shown to others.
+    /// Name of a file in the page, which is shown to others.
     fn shown(&self, file: &Path) -> String {
         match (self.record_paths, file.file_name()) {
             (false, Some(name)) => name.to_string_lossy().into_owned(),

@@ -45,22 +45,22 @@ const CHUNK: usize = 32 << 10;
 pub struct Send {
     #[arg(value_name = "LOG", help = super::recordings("Recording", ""))]
     pub source: PathBuf,
-    /// To whom: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH
+    /// Address of the daemon: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH
     #[arg(value_name = "ADDRESS", default_value = "tcp://127.0.0.1:4550")]
     pub address: String,
     /// Topic; the IMU topic by default
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Where a value lies in the message: ROLE=PATH, as in replay
+    /// Path of a value in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
-    /// What the daemon is to call the sensor; the topic by default
+    /// Name for the sensor in the daemon; the topic by default
     #[arg(long, value_name = "NAME")]
     pub id: Option<String>,
-    /// How many times as fast as they were measured, or max
+    /// Speed as a factor of the time in which they were measured, or max
     #[arg(
         long,
         value_name = "FACTOR",
@@ -78,11 +78,11 @@ pub struct Send {
 struct Line {
     due: Nanos,
     text: String,
-    /// It has no rate: a force or a field that corrects those that have one.
+    /// Whether it has no rate: a force or a field that corrects those that have one.
     is_beside: bool,
 }
 
-/// What the thread that reads has come to.
+/// Progress of the thread that reads.
 #[derive(Debug, Default)]
 struct Read {
     topic: String,
@@ -195,13 +195,13 @@ fn read(
     Ok(Read { topic, lost })
 }
 
-/// What was sent.
+/// Account of what was sent.
 #[derive(Debug, Default)]
 struct Sent {
     samples: u64,
     /// Lines of forces and fields beside them.
     besides: u64,
-    /// Between the first stamp and the last, s.
+    /// Time between the first stamp and the last, s.
     data_secs: f64,
     /// Errors that came back.
     complaints: u64,

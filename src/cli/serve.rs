@@ -52,11 +52,11 @@ Talk to it:
   http://127.0.0.1:8765/ in a browser                          the live page; /top: a top to spin
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
-    /// Where else samples come from: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
+    /// Other sources of samples: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
     /// again whenever lost; ?id=NAME names the sensor), or - for standard input
     #[arg(value_name = "SOURCE")]
     pub sources: Vec<String>,
-    /// Where to listen: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (with
+    /// Listeners: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (with
     /// HTTP), unix-listen:///PATH. May be given several times; port 0 takes a free one
     /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
     #[arg(long, value_name = "URI")]
@@ -302,7 +302,7 @@ fn reopen(hub: &Hub) -> bool {
 }
 
 impl Serve {
-    /// How to record, if at all.
+    /// Settings of a recording, if there is to be one.
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag.

@@ -14,10 +14,10 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// Where the page is when nothing else is said: beside the daemon's.
+/// Address of the page when none is given: beside the daemon's.
 const PAGE: &str = "127.0.0.1:8766";
 
-/// How a run is served to whoever connects.
+/// Way by which a run is served to whoever connects.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Serving (-o tcp-listen://, unix-listen://, ws-listen://)")]
 pub struct Serving {
@@ -39,11 +39,11 @@ pub struct Serving {
 /// A run to be served, and how.
 #[derive(Debug)]
 pub(super) struct Served {
-    /// To where.
+    /// Targets.
     pub(super) targets: Vec<Target>,
-    /// How fast.
+    /// Speed.
     pub(super) speed: Option<f64>,
-    /// Its server, where there is somebody to serve.
+    /// Server, where there is somebody to serve.
     cast: Option<Arc<Cast>>,
     looping: bool,
     can_rewind: bool,
@@ -144,7 +144,7 @@ impl Serving {
 }
 
 impl Served {
-    /// Who is shown the run.
+    /// Audience of the run.
     pub(super) fn audience(&self) -> Option<Arc<dyn Audience>> {
         let cast = self.cast.clone()?;
         Some(cast)

@@ -35,7 +35,7 @@ use strapd_recording::pool::Pool;
   strapd simulate top --speed 1 -o tcp://127.0.0.1:4550  feeds a strapd serve
   strapd simulate top --page                             in a browser, with play, pause and seek")]
 pub struct Simulate {
-    /// Which motion
+    /// Motion
     #[command(subcommand)]
     pub motion: Which,
 }
@@ -77,11 +77,11 @@ pub enum Which {
 #[derive(Debug)]
 struct Made {
     motion: Motion,
-    /// What a reading of the accelerometer is unless the user says.
+    /// Meaning of a reading of the accelerometer unless the user states one.
     force: ForceSampling,
     /// m/s^2, downwards, where the motion itself depends on it.
     gravity: Option<f64>,
-    /// What was asked for, as it will stand in the metadata.
+    /// Parameters that were asked for, as they will stand in the metadata.
     parameters: Vec<(String, String)>,
     /// Things to know about it.
     notes: Vec<String>,

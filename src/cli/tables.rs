@@ -4,17 +4,17 @@ use crate::error::{Error, Result};
 use clap::Args;
 use strapd_recording::decode::Options;
 
-/// How a table of text (CSV, TSV, ...) is to be read.
+/// Layout of a table of text (CSV, TSV, ...).
 #[derive(Args, Debug, Clone, Default)]
 #[command(next_help_heading = "Tables of text")]
 pub struct Tables {
-    /// What the columns of a table are, by name or number from 1: ROLE=NAME:NAME:NAME[:UNIT],ROLE=...
+    /// Columns of a table, by name or number from 1: ROLE=NAME:NAME:NAME[:UNIT],ROLE=...
     ///
     /// ROLE is one of gyro, accel, mag (x:y:z), orientation (w:x:y:z), stamp, counter. `info` and the summary print what
     /// they assumed. Roles that are not given are found by name; =none leaves one out.
     #[arg(long, value_name = "ROLE=NAMES")]
     pub columns: Option<String>,
-    /// What stands between the cells of a table: tab, semicolon, comma, pipe, blanks, or a punctuation mark
+    /// Delimiter between the cells of a table: tab, semicolon, comma, pipe, blanks, or a punctuation mark
     #[arg(long, value_name = "MARK")]
     pub delimiter: Option<String>,
 }

@@ -28,17 +28,17 @@ use strapd_recording::decode::packed::Form;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-/// Between two pictures; a sensor is asked for no more attitudes than that.
+/// Time between two pictures; a sensor is asked for no more attitudes than that.
 const FRAME: Duration = Duration::from_millis(100);
 /// Attitudes asked of each sensor, a second.
 const RATE_HZ: f64 = 10.0;
-/// Between two questions for the daemon's state.
+/// Time between two questions for the daemon's state.
 const POLL: Duration = Duration::from_secs(1);
-/// Between two lines of a sensor where there is no terminal.
+/// Time between two lines of a sensor where there is no terminal.
 const LINE: Duration = Duration::from_secs(1);
-/// By when a daemon must have answered before another attempt.
+/// Time by which a daemon must have answered before another attempt.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Between a loss and the next attempt.
+/// Time between a loss and the next attempt.
 const RETRY: Duration = Duration::from_millis(500);
 
 /// Every sensor of a daemon, live in the terminal: attitude, horizon, rates, health.
@@ -104,7 +104,7 @@ fn use_colour(when: When) -> bool {
     }
 }
 
-/// Where it is shown.
+/// Output on which it is shown.
 enum Out {
     Screen(Screen, mpsc::Receiver<Key>),
     /// And when a line was written last.
@@ -119,7 +119,7 @@ struct Watching<'a> {
 }
 
 impl Watching<'_> {
-    /// Until the user has enough.
+    /// Runs until the user has enough.
     async fn on(&mut self, out: &mut Out) -> Result<()> {
         let mut frames = interval(FRAME);
         frames.set_missed_tick_behavior(MissedTickBehavior::Delay);

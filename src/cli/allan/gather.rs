@@ -41,13 +41,13 @@ pub(super) struct Gathered {
     pub(super) resolved: Meaning,
     /// Angles; of rates in units of `interval`.
     pub(super) record: AngleRecord,
-    /// How many it holds at most.
+    /// Number it holds at most.
     capacity: usize,
     /// Mean sampling interval where samples follow each other, s.
     pub(super) interval: f64,
     /// Root mean square of its variation, s.
     pub(super) unevenness: f64,
-    /// From the first stamp to the last, s.
+    /// Time from the first stamp to the last, s.
     pub(super) secs: f64,
     /// Missing samples replaced by a straight line, and in how many places.
     pub(super) filled: u64,
@@ -357,7 +357,7 @@ impl Gathered {
         self.resting() < RESTING * self.secs
     }
 
-    /// What is to be known before the numbers are believed.
+    /// Warnings to read before the numbers are believed.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut all = self.notes.clone();
         if self.moved() {
@@ -402,7 +402,7 @@ impl Gathered {
         all
     }
 
-    /// How much it moved, and which part did not.
+    /// Warning about how much it moved, and which part did not.
     fn moving(&self) -> Diagnostic {
         let said = Diagnostic::new(format!(
             "the sensor moved: at rest for {:.1} of {:.1} s, and motion looks like noise",

@@ -9,7 +9,7 @@ use std::path::Path;
 use strapd_attitude::noise::allan::{AllanFit, FittedTerm, MAX_MISFIT, Point};
 use strapd_attitude::noise::sensor_error::{ImuError, TERMS, Term};
 
-/// Which term of a fit.
+/// Selector of a term of a fit.
 type Of = fn(&AllanFit) -> &FittedTerm;
 
 /// The fitted terms by key.
@@ -25,7 +25,7 @@ fn term(key: &str) -> Option<&'static Term> {
     TERMS.iter().find(|t| t.key == key)
 }
 
-/// What makes the fit doubtful.
+/// Reasons why the fit is doubtful.
 pub(super) fn doubts(axes: &[Axis]) -> Vec<String> {
     let mut all = Vec::new();
     for axis in axes {
@@ -68,7 +68,7 @@ fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
     }
 }
 
-/// What `replay --noise` takes, axis by axis, in the units of data sheets. `None` without an
+/// Text that `replay --noise` takes, axis by axis, in the units of data sheets. `None` without an
 /// angle random walk on every axis, or from a sensor that moved.
 fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
     let errors: Option<Vec<ImuError>> = axes

@@ -104,7 +104,7 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
 struct Printer {
     out: BufWriter<Stdout>,
     format: Format,
-    /// Who is listened to.
+    /// Address that is listened to.
     address: Address,
     left: u64,
     dropped: u64,
@@ -120,7 +120,7 @@ const BURST: u32 = 8;
 /// Complaints remembered, so that each is said once.
 const MOST_TOLD: usize = 64;
 
-/// What is wrong with what comes: each once, not many at a time, and an end where there is nothing else.
+/// Complaints about what comes: each once, not many at a time, and an end where there is nothing else.
 struct Complaints {
     allowance: Allowance,
     told: BTreeSet<String>,
@@ -226,7 +226,7 @@ impl Printer {
         }
     }
 
-    /// What was counted in place of being said.
+    /// Prints what was counted instead of being printed.
     fn sum_up(&self) {
         match self.complaints.unsaid {
             0 => {}

@@ -1,4 +1,4 @@
-//! What may correct an attitude -> words. Pure.
+//! Measurements that may correct an attitude -> words. Pure.
 
 use crate::report::summary::significant;
 use strapd_recording::recording::beside::TopicOfVectors;

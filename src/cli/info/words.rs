@@ -1,4 +1,4 @@
-//! What `info` found -> text. Pure.
+//! Results of `info` -> text. Pure.
 
 use crate::report::calendar::{date, duration};
 use crate::report::findings::of_samples;
@@ -14,7 +14,7 @@ use strapd_replay::inspection::Inspection;
 /// Most other topics that are listed.
 const OTHERS: usize = 40;
 
-/// For people.
+/// Text for people.
 #[must_use]
 pub(super) fn text(info: &Overview<'_>) -> String {
     let mut out = String::new();

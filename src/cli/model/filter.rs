@@ -17,7 +17,7 @@ const LONGEST: u64 = 1 << 20;
 /// Why a request has no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Refusal {
-    /// In words, with the numbers.
+    /// Error in words, with the numbers.
     pub(super) error: String,
     /// The kind of reason, for programs, where a model has several.
     pub(super) reason: Option<&'static str>,
@@ -42,7 +42,7 @@ pub(super) fn run<R: DeserializeOwned>(
     run_as(answer, |value: &Value| value.to_string())
 }
 
-/// As [`run`], with answers written otherwise than as a line of JSON.
+/// Runs as [`run`], with answers written otherwise than as a line of JSON.
 ///
 /// # Errors
 /// As [`run`].

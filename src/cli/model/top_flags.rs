@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use strapd_bodies::top::method_errors::body;
 use strapd_bodies::top::{Case, EulerAngles, EulerState, SymmetricTop};
 
-/// Which top, and how it starts. The defaults are the source document's.
+/// Top, and how it starts. The defaults are the source document's.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Top")]
 pub struct TopFlags {
@@ -29,7 +29,7 @@ pub struct TopFlags {
     /// Any start: precession,nutation,spin angles in degrees, turned about z, x', z''
     #[arg(long, value_name = "DEG,DEG,DEG", allow_hyphen_values = true)]
     pub euler: Option<String>,
-    /// Their rates, degrees a second; instead of --spin-hz
+    /// Rates of the start, degrees a second; instead of --spin-hz
     #[arg(
         long,
         value_name = "DPS,DPS,DPS",
@@ -88,7 +88,7 @@ impl TopFlags {
         self.spin_hz.unwrap_or(20.0)
     }
 
-    /// Its start.
+    /// Start of the top.
     ///
     /// # Errors
     /// [`Error::Usage`] for a start the case does not have.
@@ -121,7 +121,7 @@ impl TopFlags {
         Ok(state)
     }
 
-    /// What was asked for, by name.
+    /// Parameters that were asked for, by name.
     pub(crate) fn parameters(&self) -> Vec<(&'static str, String)> {
         let seed = SymmetricTop::published();
         let inertia = || format!("{},{}", seed.transverse(), seed.axial());
@@ -150,7 +150,7 @@ impl TopFlags {
         list
     }
 
-    /// What a start leads to that may not have been meant.
+    /// Notes on what a start leads to that may not have been meant.
     pub(crate) fn notes(top: &SymmetricTop, start: &EulerState) -> Vec<String> {
         let mut notes = Vec::new();
         let spin_hz = start.w3.abs() / TAU;

@@ -20,7 +20,7 @@ use strapd_bodies::youbot::{Arm, ArmError, DriverJoints, DriverMotion, TableJoin
 /// The KUKA youBot's arm: kinematics, forces, paths.
 #[derive(Args, Debug)]
 pub struct Youbot {
-    /// What is asked
+    /// Question about the arm
     #[command(subcommand)]
     pub what: What,
 }
@@ -130,7 +130,7 @@ fn filter<R: DeserializeOwned>(flags: Flags, answer: fn(&R, Unit) -> Answer) -> 
     }
 }
 
-/// In what angles are said.
+/// Unit of angles.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Unit {
     Radians,

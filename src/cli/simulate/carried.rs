@@ -20,21 +20,21 @@ impl Carried {
     }
 }
 
-/// Where a person wears it.
+/// Place where a person wears it.
 #[derive(ValueEnum, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WornArg {
-    /// On the waist
+    /// Waist
     Waist,
-    /// In the hand of a swinging arm
+    /// Hand of a swinging arm
     Hand,
-    /// On the foot
+    /// Foot
     Foot,
 }
 
 /// A person who goes: stands for 3 s, then walks or runs, turning off every ten seconds or so.
 #[derive(Args, Debug)]
 pub struct Gait {
-    /// Where the sensor is worn
+    /// Place where the sensor is worn
     #[arg(long, value_enum, default_value = "waist")]
     pub worn: WornArg,
     #[command(flatten)]

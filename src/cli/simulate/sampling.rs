@@ -20,12 +20,12 @@ use strapd_bodies::synthetic::{ForceSampling, Magnetometer, Sampling, Synthetic}
 /// Gravity where the motion does not say otherwise: standard gravity.
 pub(super) const GRAVITY: f64 = 9.80665;
 
-/// What a reading of the accelerometer is.
+/// Meaning of a reading of the accelerometer.
 #[derive(ValueEnum, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ForceArg {
-    /// Of the instant, whatever the gyro's sample is
+    /// Instant, whatever the gyro's sample is
     Instant,
-    /// As the gyro's: of the instant beside a rate, else the mean over the interval
+    /// Same as the gyro: of the instant beside a rate, else the mean over the interval
     AsGyro,
 }
 
@@ -38,11 +38,11 @@ impl From<ForceArg> for ForceSampling {
     }
 }
 
-/// How a motion is sampled, and where the samples go.
+/// Settings of sampling a motion, and of the outputs.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Sampling")]
 pub struct Common {
-    /// Where the samples go: .mcap, .ndjson, .csv or .parquet (.tum: the true attitude alone), - (NDJSON on stdout), null: (nowhere);
+    /// Output for the samples: .mcap, .ndjson, .csv or .parquet (.tum: the true attitude alone), - (NDJSON on stdout), null: (nowhere);
     /// tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects);
     /// tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens). May be given
     /// several times
@@ -60,7 +60,7 @@ pub struct Common {
     /// Compression of MCAP outputs
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
-    /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
+    /// Speed: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
     #[arg(
         long,
         value_name = "FACTOR",
@@ -90,11 +90,11 @@ pub struct Common {
         allow_negative_numbers = true
     )]
     pub duration: f64,
-    /// What a sample is: the rate at its stamp, the mean over the interval that ends at its stamp, the
+    /// Meaning of a sample: the rate at its stamp, the mean over the interval that ends at its stamp, the
     /// integral over it, or the whole rotation in it
     #[arg(long, help_heading = "Sampling", value_enum, default_value = "rate")]
     pub sample_kind: KindArg,
-    /// Where the accelerometer sits: from the point whose motion it is, m, body axes (ahead, left, up)
+    /// Position of the accelerometer: from the point whose motion it is, m, body axes (ahead, left, up)
     #[arg(
         long,
         help_heading = "Sampling",
@@ -103,7 +103,7 @@ pub struct Common {
         allow_hyphen_values = true
     )]
     pub lever_arm: String,
-    /// What a reading of the accelerometer is [default: as-gyro where the sensor is carried, else instant]
+    /// Meaning of a reading of the accelerometer [default: as-gyro where the sensor is carried, else instant]
     #[arg(long, help_heading = "Sampling", value_enum)]
     pub force_sampling: Option<ForceArg>,
     /// A magnetometer too, so many readings a second [default: one with every sample]

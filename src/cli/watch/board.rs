@@ -1,4 +1,4 @@
-//! What a daemon says -> what is known of every sensor. Pure: time is given.
+//! Messages of a daemon -> what is known of every sensor. Pure: time is given.
 
 use crate::client::watcher::Said;
 use serde::Deserialize;
@@ -13,42 +13,42 @@ const MAX_SENSORS: usize = 1024;
 /// Everything that is known.
 #[derive(Debug)]
 pub(super) struct Board {
-    /// What the user asked for.
+    /// Name that the user asked for.
     pub(super) name: String,
     /// The sensors the user asked for; none: all.
     ids: Vec<String>,
     pub(super) link: LinkState,
     pub(super) sensors: BTreeMap<String, Sensor>,
-    /// What the daemon complained of last.
+    /// Last complaint of the daemon.
     pub(super) complaint: Option<String>,
 }
 
-/// How the connection stands.
+/// State of the connection.
 #[derive(Debug)]
 pub(super) enum LinkState {
     Connecting,
     Connected(Instant),
-    /// Since when, and why.
+    /// Lost: since when, and why.
     Lost(Instant, String),
 }
 
-/// What is known of one sensor.
+/// Knowledge of one sensor.
 #[derive(Debug, Default)]
 pub(super) struct Sensor {
     pub(super) attitude: Option<Attitude>,
-    /// When the last attitude came.
+    /// Time of the last attitude.
     pub(super) heard: Option<Instant>,
     /// Attitudes we were too slow for.
     pub(super) dropped: u64,
     pub(super) health: Health,
 }
 
-/// What the daemon says of a sensor's samples.
+/// Health of a sensor's samples, by the daemon.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub(super) struct Health {
     #[serde(default)]
     id: String,
-    /// Of a stream that is no sensor's: what it is made of.
+    /// Class of the samples of which a stream that is no sensor's is made.
     class: Option<String>,
     #[serde(default)]
     pub(super) samples: u64,
@@ -64,11 +64,11 @@ pub(super) struct Health {
     aid: Option<Aid>,
 }
 
-/// What the daemon says of an attitude that is not the gyro's alone.
+/// Knowledge of an attitude that is not the gyro's alone, by the daemon.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Knowledge {
-    /// By what it is corrected.
+    /// Measurements by which it is corrected.
     pub(super) aided: Option<String>,
     pub(super) rest: bool,
     pub(super) sigma_deg: Tilt,

@@ -6,7 +6,7 @@
 
 /// Tangent of half the angle the picture is wide.
 const HALF_WIDTH: f64 = 1.0;
-/// How much higher than wide a character is.
+/// Ratio of height to width of a character.
 const TALL: f64 = 2.0;
 
 /// Up in body axes as (forward, right, up). `q` is `[w, x, y, z]`, body to world.
@@ -95,7 +95,7 @@ mod tests {
     const Y: [f64; 3] = [0.0, 1.0, 0.0];
     const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
-    /// How much of each quarter is ground: upper left, upper right, lower left, lower right.
+    /// Share of each quarter that is ground: upper left, upper right, lower left, lower right.
     fn ground(q: [f64; 4], world: &str, body: &str) -> [usize; 4] {
         let lines = horizon(q, world, body, 21, 9);
         assert_eq!(lines.len(), 9);

@@ -15,7 +15,7 @@ use tokio::sync::mpsc;
 /// Whether the terminal is ours now, and must be given back.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// What the user wants.
+/// Key that the user pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
     Leave,

@@ -1,4 +1,4 @@
-//! What is known -> lines of text. Pure: time is given. Everything that came from a daemon was made
+//! Knowledge -> lines of text. Pure: time is given. Everything that came from a daemon was made
 //! fit for a terminal when it was read.
 
 use super::board::{Board, LinkState, Sensor};
@@ -12,22 +12,22 @@ use strapd_recording::text::printable;
 const PICTURE: (usize, usize) = (21, 7);
 /// Below this width there is no room for a picture.
 const WIDE: usize = 84;
-/// After this silence a sensor is marked.
+/// Silence after which a sensor is marked.
 const SILENT: Duration = Duration::from_secs(2);
-/// After this silence it stands behind those that speak, in one line.
+/// Silence after which it stands behind those that speak, in one line.
 const FOLDED: Duration = Duration::from_secs(5);
-/// What is said of a sensor that has said nothing to us, but what was last before we came.
+/// Text for a sensor that has said nothing to us, but what was last before we came.
 const NEVER_HEARD: &str = "silent since this watch began";
 /// Longest name that is shown whole.
 const MAX_NAME: usize = 48;
 
-/// How a line is shown.
+/// Tone of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
     Heading,
     Alarm,
-    /// Where the figures of x, y and z begin, and where that of z ends, in characters.
+    /// Columns where the figures of x, y and z begin, and where that of z ends, in characters.
     Axes([usize; 4]),
 }
 
@@ -124,7 +124,7 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
     lines
 }
 
-/// Since when it was not heard; `None`: it never was.
+/// Time since it was heard; `None`: it never was.
 fn silence(sensor: &Sensor, now: Instant) -> Option<Duration> {
     let heard = sensor.heard?;
     Some(now.saturating_duration_since(heard))
@@ -266,7 +266,7 @@ fn rate(sensor: &Sensor) -> String {
     rate.map_or_else(String::new, |v| format!("{v:.1} Hz  "))
 }
 
-/// When it was heard last.
+/// Time since it was heard last, in words.
 fn age(sensor: &Sensor, now: Instant) -> String {
     sensor.heard.map_or_else(
         || NEVER_HEARD.to_owned(),
@@ -274,7 +274,7 @@ fn age(sensor: &Sensor, now: Instant) -> String {
     )
 }
 
-/// What corrects it, how well tilt and heading are known, and what was learned of the gyro.
+/// Lines of what corrects it, how well tilt and heading are known, and what was learned of the gyro.
 fn knowledge(sensor: &Sensor) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(known) = &sensor.health.attitude {
@@ -300,7 +300,7 @@ fn knowledge(sensor: &Sensor) -> Vec<String> {
     lines
 }
 
-/// Where there is no terminal: a line for each sensor, and one when the daemon is not there.
+/// Lines where there is no terminal: one for each sensor, and one when the daemon is not there.
 pub(super) fn plain(board: &Board, now: Instant) -> String {
     let mut out = String::new();
     if let LinkState::Lost(..) | LinkState::Connecting = board.link {

@@ -69,9 +69,9 @@ pub(super) struct Request {
 pub(crate) struct Prepared {
     /// The IMU on the gripper along it.
     pub(crate) gripper: Gripper,
-    /// By how much it was slowed.
+    /// Factor by which it was slowed.
     pub(crate) factor: f64,
-    /// How long it lasts, s.
+    /// Duration, s.
     pub(crate) duration: f64,
     /// m/s^2, base axes.
     pub(crate) gravity: [f64; 3],
@@ -204,7 +204,7 @@ fn tool(
     slowed(request, setting, joints)
 }
 
-/// As slow as was asked for, and by how much.
+/// Slows it as much as was asked for; returns by how much.
 fn slowed(
     request: &Request,
     setting: &Setting,
