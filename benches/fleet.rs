@@ -1,4 +1,4 @@
-//! What a sensor more costs one daemon: bytes, its birth, and a sample, from 1 to 100,000 sensors at the same
+//! Cost of one more sensor in one daemon: bytes, its birth, and a sample, from 1 to 100,000 sensors at the same
 //! number of samples in all. The figures stand in `docs/scale.md`.
 //!
 //! `cargo bench --bench fleet -- [gyro|aided] [SENSORS...]`, each in a process of its own, since memory is that of the

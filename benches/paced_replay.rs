@@ -1,4 +1,4 @@
-//! How evenly `strapd replay --speed 1` keeps the time of its data: when each attitude arrives at a
+//! Timing of `strapd replay --speed 1`: when each attitude arrives at a
 //! watcher over TCP, against when it is due. The figures stand in `docs/performance.md`, "Paced replay".
 //!
 //! `cargo bench --bench paced_replay -- [SECONDS]`, default 60. Made by `strapd simulate` first. Due is

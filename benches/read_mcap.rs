@@ -1,4 +1,4 @@
-//! How fast a log is read: our walk with one and two threads against `mcap::MessageStream`, on a
+//! Speed of reading a log: our walk with one and two threads against `mcap::MessageStream`, on a
 //! generated log of 324-byte `sensor_msgs/msg/Imu` messages in 1 MiB chunks.
 //!
 //! `cargo bench --bench read_mcap`; `STRAPD_BENCH_MESSAGES` sets the size (default 1,000,000),
@@ -15,7 +15,7 @@ use strapd_recording::mcap::{Message, Reader, WalkOptions, walk};
 
 const RUNS: usize = 5;
 
-/// What a decoder needs at least: the header's stamp and the rate.
+/// Fields that a decoder needs at least: the header's stamp and the rate.
 #[derive(Clone, Copy)]
 struct Rate {
     #[allow(dead_code)]

@@ -1,4 +1,4 @@
-//! How fast and how evenly `strapd serve` answers: a bounded load on a daemon of its own, over TCP on
+//! Speed and latency of `strapd serve`: a bounded load on a daemon of its own, over TCP on
 //! loopback. The figures stand in `docs/performance.md`, "Serving".
 //!
 //! `cargo bench --bench serve_load -- [SECONDS] [CASE]...`; cases by name, default all. From a minute on the
@@ -115,7 +115,7 @@ fn push_packed(out: &mut Vec<u8>, publisher: usize, n: u64, step: u64) {
     packed::push_sample(out, publisher as u32, n, &sample);
 }
 
-/// What a subscriber has seen.
+/// Account of what a subscriber has seen.
 #[derive(Default)]
 struct Seen {
     attitudes: u64,
@@ -313,7 +313,7 @@ fn paced(name: &str, publishers: usize, hz: u64, subscribers: usize, stalled: us
     soaked(&levels);
 }
 
-/// How memory and open files went: the slope of a straight line through all.
+/// Prints how memory and open files went: the slope of a straight line through all.
 fn soaked(levels: &[(f64, f64, usize)]) {
     let (Some(first), Some(last)) = (levels.first(), levels.last()) else {
         return;

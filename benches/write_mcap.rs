@@ -1,4 +1,4 @@
-//! How long a sample takes to become output, per format, on one thread and on two.
+//! Time from a sample to output, per format, on one thread and on two.
 //!
 //! `cargo bench --bench write_mcap`; the time shown is for one sample. Files go to a temporary
 //! directory, and the sync at the end is part of the time, as it is in a run.

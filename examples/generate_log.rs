@@ -29,7 +29,7 @@ use std::path::PathBuf;
 struct Arguments {
     /// File to write; replaced when it exists.
     output: PathBuf,
-    /// How many messages.
+    /// Number of messages.
     #[arg(long, default_value_t = 5_000_000)]
     messages: u64,
     /// Stop sooner, when the file has this many bytes.
@@ -67,7 +67,7 @@ fn positive(text: &str) -> Result<f64, String> {
 /// 2023-11-14 22:13:20 UTC.
 const START: i64 = 1_700_000_000_000_000_000;
 
-/// Where in the 324 bytes the numbers that change stand.
+/// Offset in the 324 bytes of the numbers that change.
 const GYRO_OFFSET: usize = 132;
 const ACCEL_OFFSET: usize = 228;
 

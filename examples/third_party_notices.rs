@@ -17,7 +17,7 @@ use std::process::Command;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// What a licence file is called, in any case and with any ending. `COPYING` stands beside one and names
+/// Names of licence files, in any case and with any ending. `COPYING` stands beside one and names
 /// what else could be chosen (zstd: the GPL).
 const NAMES: [&str; 4] = ["LICENSE", "LICENCE", "NOTICE", "UNLICENSE"];
 

@@ -89,7 +89,7 @@ fn seen(point: &nalgebra::Vector3<f64>) -> [f64; 2] {
     [point.x, s * point.y + c * point.z]
 }
 
-/// Where the axis of symmetry points, every `thin`-th sample.
+/// Directions of the axis of symmetry, at every `thin`-th sample.
 fn locus(attitudes: &[Attitude], thin: usize) -> Vec<[f64; 2]> {
     attitudes
         .iter()
@@ -163,7 +163,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
     })
 }
 
-/// What is compared over time and rate: name, and the attitudes at every sample.
+/// Contender that is compared over time and rate: name, and the attitudes at every sample.
 type Compared = (&'static str, How);
 
 #[derive(Clone, Copy)]

@@ -142,8 +142,8 @@ pub fn schema(data: &[u8]) {
     }
 }
 
-/// NDJSON with packed objects, or a table: however the bytes are cut, the lines and objects are the same, and each is a sample or an
-/// error.
+/// NDJSON with packed objects, or a table: however the bytes are cut, the lines and objects are the same, and each is
+/// a sample or an error.
 pub fn lines(data: &[u8]) {
     let cut = |size: usize| {
         let mut framer = Framer::new();
@@ -198,7 +198,7 @@ fn rows(data: &[u8]) {
     }
 }
 
-/// As many bytes at a time.
+/// Reader that gives as many bytes at a time.
 struct Dribble<'b>(&'b [u8], usize);
 
 impl std::io::Read for Dribble<'_> {
@@ -211,7 +211,7 @@ impl std::io::Read for Dribble<'_> {
     }
 }
 
-/// What a table gives: samples, and why rows are none.
+/// Contents of a table: samples, and why rows are none.
 fn table(data: &[u8], at_once: usize, options: &Options) -> (Vec<String>, Vec<RawSample>) {
     let mut said = Vec::new();
     let mut samples = Vec::new();
@@ -290,7 +290,7 @@ enum Item {
     Broken,
 }
 
-/// As long as it says; what it says is written again as the same sample.
+/// Parses an object as long as it states; what it holds is written again as the same sample.
 fn packed_object(object: &[u8]) {
     assert_eq!(packed::length(object), Some(object.len()));
     match packed::read(object, NOW) {
@@ -316,8 +316,8 @@ fn packed_object(object: &[u8]) {
     }
 }
 
-/// A whole conversation with the daemon, watched as lines or (by the first byte) packed: what it answers is JSON, a line
-/// each, or whole packed attitudes that were named before, and every attitude is finite.
+/// A whole conversation with the daemon, watched as lines or (by the first byte) packed: what it answers is JSON, a
+/// line each, or whole packed attitudes that were named before, and every attitude is finite.
 pub fn session(data: &[u8]) {
     let settings = strapd::serve::Settings::default();
     let Ok(hub) = Hub::new(settings) else {
@@ -417,7 +417,7 @@ fn answer(line: &[u8], named: &mut BTreeSet<u64>) {
     }
 }
 
-/// What a viewer sends: text and binary messages of Foxglove's protocol.
+/// Parses what a viewer sends: text and binary messages of Foxglove's protocol.
 pub fn foxglove(data: &[u8]) {
     for asked in [
         strapd::serve::foxglove::read_text(data),

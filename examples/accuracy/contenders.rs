@@ -1,4 +1,4 @@
-//! Who is compared: our methods and the peers' formulas, by what they read. Samples -> attitudes. Pure.
+//! Contenders: our methods and the peers' formulas, by what they read. Samples -> attitudes. Pure.
 
 use crate::peers::{self, Peer};
 use strapd_attitude::frames::{Body, Nav};
@@ -11,10 +11,10 @@ use strapd_attitude::record::{RateSample, SampleKind};
 /// One way from samples to attitude.
 #[derive(Clone, Copy)]
 pub struct Contender {
-    /// As in tables and legends.
+    /// Name in tables and legends.
     pub name: &'static str,
     way: Way,
-    /// Its attitudes are meant to be right at every so many samples only.
+    /// Number of samples after which its attitudes are meant to be right.
     pub every: usize,
 }
 

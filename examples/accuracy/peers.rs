@@ -1,8 +1,8 @@
 //! Rates or delta angles -> attitude, the way other projects do it: their formulas, written anew. Pure.
 //!
 //! Each is what its project computes for attitude alone: no Earth rate, no bias, no correction. Projects and
-//! commits are those of `docs/theory/attitude.md` 1; `crates/bodies/tests/bodies/accuracy/peers.rs` holds each to the figures measured there.
-//! The first sample has the initial attitude; interval k runs from sample k - 1 to k.
+//! commits are those of `docs/theory/attitude.md` 1; `crates/bodies/tests/bodies/accuracy/peers.rs` holds each to the
+//! figures measured there. The first sample has the initial attitude; interval k runs from sample k - 1 to k.
 
 use nalgebra::Vector3;
 use strapd_attitude::frames::{Body, Nav};
@@ -19,7 +19,7 @@ fn advanced(q: &Attitude, phi: Vector) -> Attitude {
     q.advanced(&RotationVector(phi)).normalised()
 }
 
-/// From each interval's rotation vector: given interval number, its samples' values, its length in seconds.
+/// Attitudes by each interval's rotation vector: given interval number, its samples' values, its length in seconds.
 fn by_vectors(
     start: Attitude,
     samples: &[RateSample],

@@ -5,7 +5,7 @@ use crate::runs::{Failure, MARGIN, Run, arcsec};
 use strapd::report::plot::{Axis, Chart, Look, Series};
 use strapd_attitude::record::SampleKind;
 
-/// How much is computed: `Whole` for publication, `Quick` to see that it runs.
+/// Amount that is computed: `Whole` for publication, `Quick` to see that it runs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Amount {
     Whole,
@@ -35,7 +35,7 @@ const OF_INCREMENTS_SHOWN: [(&str, &str); 7] = [
     ("**auto", "strapd auto: centred 15"),
 ];
 
-/// Who is drawn, and the words of the legend.
+/// Contenders that are drawn, and the words of the legend.
 fn shown(kind: SampleKind) -> Result<Vec<(Contender, &'static str)>, Failure> {
     let (all, picked): (&[Contender], _) = match kind {
         SampleKind::Rate => (&OF_RATES, OF_RATES_SHOWN),

@@ -22,7 +22,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// At these instants, nanoseconds, rising.
+    /// Makes one at these instants, nanoseconds, rising.
     fn new(motion: &mut Motion, stamps: impl Iterator<Item = u64>) -> Self {
         let mut run = Run {
             rates: Vec::new(),
@@ -77,8 +77,8 @@ impl Run {
         ))
     }
 
-    /// Random motion of 2 rad/s rms an axis up to 10 Hz, sampled at 200 Hz (`docs/theory/attitude.md` 6.3), at instants off by up
-    /// to `jitter` of the interval.
+    /// Random motion of 2 rad/s rms an axis up to 10 Hz, sampled at 200 Hz (`docs/theory/attitude.md` 6.3), at
+    /// instants off by up to `jitter` of the interval.
     pub fn random(seed: u64, jitter: f64, seconds: u64) -> Result<Self, Failure> {
         let mut motion = Motion::BandLimited(Box::new(BandLimited::random(seed, 2.0, 10.0, 40)?));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -24,9 +24,9 @@ use std::path::Path;
 
 /// A file of `fixtures/`.
 pub(crate) struct Fixture {
-    /// Its name in `fixtures/`.
+    /// Name in `fixtures/`.
     pub(crate) name: &'static str,
-    /// What it holds.
+    /// Contents.
     pub(crate) bytes: Vec<u8>,
 }
 
@@ -85,12 +85,12 @@ fn fixture(name: &'static str, bytes: Vec<u8>) -> Fixture {
     Fixture { name, bytes }
 }
 
-/// What one message holds of the motion.
+/// Meaning of one message for the motion.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Sampling {
     /// The rate at the stamp.
     Rate,
-    /// Its mean since the stamp before; for the first sample, over as long an interval before the start:
+    /// Mean since the stamp before; for the first sample, over as long an interval before the start:
     /// a sensor that averages was running before it was recorded.
     Average,
 }

@@ -12,7 +12,7 @@ use mcap::McapResult;
 /// Messages are this far apart.
 const PERIOD: i64 = 10_000_000;
 
-/// What happens at a sample.
+/// Fault at a sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Fault {
     /// Sent as it should be.
@@ -59,7 +59,7 @@ pub(crate) fn fault_of(k: i64) -> Fault {
     }
 }
 
-/// How many samples the motion has, missing ones included.
+/// Number of samples in the motion, missing ones included.
 pub(crate) const SAMPLES: i64 = 700;
 
 /// The recording.

@@ -98,8 +98,8 @@ pub(crate) fn imu_definition() -> String {
     definition(IMU_FIELDS, &[HEADER, TIME, QUATERNION, VECTOR3])
 }
 
-/// What `rosbag2` writes beside a channel, so that `ros2 bag play` offers the topic as a driver would:
-/// best effort, volatile, keep last 10.
+/// Quality of service that `rosbag2` writes beside a channel, so that `ros2 bag play` offers the topic as a driver
+/// would: best effort, volatile, keep last 10.
 pub(crate) const SENSOR_DATA_QOS: &str = "\
 - history: 1
   depth: 10

@@ -8,7 +8,7 @@ use mcap::{Compression, McapResult, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
-/// How messages are stored.
+/// Storage of messages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Storage {
     /// Chunks of about 64 KiB, so that a short recording has several and a cut or a flipped bit leaves some.

@@ -1,4 +1,5 @@
-//! The calibration of a sensor <-> a dict, under the names of its file (`docs/calibration.md`). Pure but for Python's objects.
+//! The calibration of a sensor <-> a dict, under the names of its file (`docs/calibration.md`). Pure but for Python's
+//! objects.
 
 use crate::refusal::argument;
 use pyo3::BoundObject;
@@ -10,7 +11,7 @@ use strapd_attitude::estimate::{Known, SensorCalibration};
 /// The keys of a calibration that hold text.
 const TEXTS: [&str; 4] = ["strapd_calibration", "sensor", "date", "sources"];
 
-/// From a dict.
+/// Reads one from a dict.
 pub fn read(value: &Bound<'_, PyAny>) -> PyResult<SensorCalibration> {
     let dict = value
         .cast::<PyDict>()
@@ -122,7 +123,7 @@ fn part<const N: usize>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Known<N
     })
 }
 
-/// As a dict that [`read`] takes.
+/// Writes a dict that [`read`] takes.
 pub fn write<'py>(py: Python<'py>, known: &SensorCalibration) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     if let Some(sensor) = &known.sensor {

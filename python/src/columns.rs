@@ -25,7 +25,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// With room for so many.
+    /// Makes them with room for so many.
     pub fn with_room(n: usize) -> Columns {
         Columns {
             t: Vec::with_capacity(n),
@@ -49,7 +49,7 @@ impl Columns {
         }
     }
 
-    /// As numpy arrays; the memory is theirs from here on.
+    /// Converts to numpy arrays; the memory is theirs from here on.
     pub fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("t", self.t.into_pyarray(py))?;

@@ -112,7 +112,7 @@ fn stamped(name: &str, t: &Times<'_>, q: &Rows<'_>, from: Convention) -> PyResul
         .collect())
 }
 
-/// What is no rotation stays what it is, and the comparison counts it.
+/// Converts to FLU. A row that is no rotation stays what it is, and the comparison counts it.
 fn in_flu(from: Convention, wxyz: [f64; 4]) -> Quaternion<Nav, Body> {
     Quaternion::<Nav, Body>::try_from_wxyz(wxyz).map_or_else(
         |_| Quaternion::assume_unit(wxyz),

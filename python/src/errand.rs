@@ -1,6 +1,7 @@
 //! Work on a thread of its own -> its result, while Python is asked for signals. I/O: a thread.
 //!
-//! Apart from the work because readers of recordings know nothing of Python: whoever waits for one may press Ctrl-C at any time,
+//! Apart from the work because readers of recordings know nothing of Python: whoever waits for one may press Ctrl-C
+//! at any time,
 //! also where the work can not be asked. Then it is told to end, waited for a moment, and left to end by itself.
 
 use crate::refusal;
@@ -10,9 +11,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Between two looks for signals.
+/// Time between two looks for signals.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// How long work that was told to end is waited for.
+/// Time for which work that was told to end is waited for.
 const GRACE: Duration = Duration::from_millis(300);
 
 /// Whether the work was told to end.

@@ -9,7 +9,7 @@ use strapd_attitude::aid::{Calibration, Filter};
 use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, learned};
 use strapd_attitude::record::Verdict;
 
-/// Of an estimator as it is now.
+/// Makes the dict of an estimator as it is now.
 pub fn of<'py>(
     py: Python<'py>,
     plan: &Plan,

@@ -200,7 +200,7 @@ impl Live {
         columns.into_dict(py)
     }
 
-    /// No more samples: the attitudes that waited for them.
+    /// Ends it: returns the attitudes that waited for more samples.
     fn finish_rows<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.check_open(py)?;
         self.is_closed = true;
@@ -213,13 +213,13 @@ impl Live {
         columns.into_dict(py)
     }
 
-    /// How many samples came.
+    /// Number of samples that came.
     #[getter]
     fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// What became of the samples so far; `None` before the first.
+    /// Outcome of the samples so far; `None` before the first.
     fn facts<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         self.running
             .as_ref()

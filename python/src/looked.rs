@@ -1,6 +1,7 @@
 //! A recorded log -> what is in it, and what may spoil its attitude, as JSON. I/O.
 //!
-//! What `strapd info --json` and `strapd check --json` say, of the same numbers (`strapd-replay`); a test holds both beside each other.
+//! What `strapd info --json` and `strapd check --json` say, of the same numbers (`strapd-replay`); a test holds both
+//! beside each other.
 
 use crate::errand;
 use crate::noted::noted;
@@ -19,7 +20,7 @@ use strapd_replay::pipeline::check;
 use strapd_replay::pipeline::inspection::look;
 use strapd_replay::pipeline::logged;
 
-/// What is in the log at `path`: JSON, and what was warned of.
+/// Contents of the log at `path`: JSON, and warnings.
 #[pyfunction]
 #[pyo3(signature = (path, /))]
 pub fn info(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {

@@ -1,7 +1,7 @@
-//! What the readers of recordings say on the way -> lines. Pure but for the thread it listens on.
+//! Events that the readers of recordings report on the way -> lines. Pure but for the thread it listens on.
 //!
-//! They say it as events of `tracing`, which the command prints on stderr. Here nobody prints: without this, what they say would
-//! be lost.
+//! They say it as events of `tracing`, which the command prints on stderr. Here nobody prints: without this, what
+//! they say would be lost.
 
 use std::fmt::{Debug, Write as _};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,6 +1,7 @@
 //! Samples as recorded -> columns -> numpy arrays over their memory. Pure but for Python's objects.
 //!
-//! The way back of [`crate::samples`]: what a log holds, or a simulation makes, in the form that `strapd.estimate` takes.
+//! The way back of [`crate::samples`]: what a log holds, or a simulation makes, in the form that `strapd.estimate`
+//! takes.
 
 use crate::columns::rows;
 use numpy::IntoPyArray;
@@ -8,14 +9,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use strapd_attitude::record::{Nanos, RawSample};
 
-/// Which stamp of a sample counts.
+/// Stamp of a sample that counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Time {
-    /// Of the sensor, where the sample has one; else as recorded.
+    /// Stamp of the sensor, where the sample has one; else as recorded.
     Header,
-    /// When it was recorded.
+    /// Time at which it was recorded.
     Log,
-    /// When it was sent.
+    /// Time at which it was sent.
     Publish,
 }
 
@@ -71,7 +72,7 @@ pub struct RawColumns {
 }
 
 impl RawColumns {
-    /// None yet.
+    /// Makes an empty set.
     pub fn new(time: Time) -> RawColumns {
         RawColumns {
             time,
@@ -114,12 +115,12 @@ impl RawColumns {
         self.dt.push(dt);
     }
 
-    /// How many.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// As numpy arrays; what no sample has is `None`. A vector with stamps of its own has them under `..._t`.
+    /// Converts to numpy arrays; what no sample has is `None`. A vector with stamps of its own has them under `..._t`.
     pub fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("t", self.t.into_pyarray(py))?;

@@ -1,4 +1,4 @@
-//! What can not be done -> the exception that says so. Pure but for the classes, which are Python's.
+//! Diagnostic -> the exception that carries it. Pure but for the classes, which are Python's.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ pub fn run(py: Python<'_>, kind: &str, what: impl Into<Diagnostic>) -> PyErr {
     raised(py, kind, &what.into(), in_python)
 }
 
-/// Its text is all of it, its `help` what helps alone.
+/// Raises it: the text is all of it, `help` what helps alone.
 fn raised(py: Python<'_>, kind: &str, what: &Diagnostic, named: fn(&str) -> String) -> PyErr {
     let text = named(&what.to_string());
     let help = what.helping().map(named);
@@ -35,8 +35,8 @@ pub fn run_of_log(py: Python<'_>, kind: &str, what: &Diagnostic) -> PyErr {
     raised(py, kind, what, of_log)
 }
 
-/// Settings are named as flags in this process (`lib.rs`), which a text shows by their dashes; here they are arguments: `--max-gap` is `max_gap`. Of arrays `--time` is
-/// `t`, the stamps themselves.
+/// Settings are named as flags in this process (`lib.rs`), which a text shows by their dashes; here they are
+/// arguments: `--max-gap` is `max_gap`. Of arrays `--time` is `t`, the stamps themselves.
 pub fn in_python(what: &str) -> String {
     named(what, &[("sample-kind", "kind"), ("time", "t")])
 }

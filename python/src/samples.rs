@@ -52,7 +52,7 @@ fn times<'a>(name: &str, array: &'a Times<'_>, n: usize) -> PyResult<&'a [i64]> 
 }
 
 impl<'a> Samples<'a> {
-    /// Of these arrays.
+    /// Makes them of these arrays.
     pub fn new(
         gyr: &'a Rows<'_>,
         t: &'a Times<'_>,
@@ -71,7 +71,7 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// How many.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.gyr.len()
     }

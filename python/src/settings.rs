@@ -122,7 +122,7 @@ impl<'a, 'py> Given<'a, 'py> {
     }
 }
 
-/// What a value is, in a message: never much of it.
+/// Text of a value in a message: never much of it.
 fn shown(value: &Bound<'_, PyAny>) -> String {
     let kind = value
         .get_type()

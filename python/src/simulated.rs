@@ -46,7 +46,7 @@ impl About {
         given.unwrap_or(Ok(plain))
     }
 
-    /// What nobody asked for by then is none of this motion's.
+    /// Refuses what nobody has asked for by now: it is none of this motion's.
     fn nothing_left(&self, motion: &str) -> Result<(), String> {
         match self.0.keys().next() {
             None => Ok(()),

@@ -1,7 +1,7 @@
 //! The arguments of a replay as the command takes them -> what is to be done. Pure but for a file with a calibration.
 //!
-//! As texts, and by the functions that read the command's: what `strapd replay` understands is understood here, in its words.
-//! (What arrays are estimated by, [`crate::settings`] reads: there a number is a number.)
+//! As texts, and by the functions that read the command's: what `strapd replay` understands is understood here, in
+//! its words. (What arrays are estimated by, [`crate::settings`] reads: there a number is a number.)
 
 use crate::settings::method_of;
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ fn usage(what: impl Into<Diagnostic>) -> Error {
 }
 
 impl Words {
-    /// Of these names and values.
+    /// Makes them of these names and values.
     pub fn new(words: BTreeMap<String, Vec<String>>) -> Words {
         Words(words)
     }
@@ -108,7 +108,7 @@ impl Words {
         })
     }
 
-    /// Which samples, and how messages are read.
+    /// Selection of samples, and how messages are read.
     ///
     /// # Errors
     /// [`Error::Usage`] naming the argument.

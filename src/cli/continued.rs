@@ -1,7 +1,7 @@
 //! Summaries of several recordings -> whether they are parts of one. Pure.
 //!
-//! Apart from the run because it is seen when all are done: a recorder that began a new file every minute leaves many, and each
-//! of them alone begins with an attitude of its own.
+//! Apart from the run because it is seen when all are done: a recorder that began a new file every minute leaves
+//! many, and each of them alone begins with an attitude of its own.
 
 use crate::report::summary::{RunSummary, TopicSummary};
 use strapd_attitude::diagnostic::Diagnostic;

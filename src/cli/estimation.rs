@@ -53,8 +53,8 @@ pub struct Estimation {
     /// Path of a value in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// Method by which rates become turns. `commit` is that of `serve`: it waits for no later sample, nor for one that was
-    /// overtaken
+    /// Method by which rates become turns. `commit` is that of `serve`: it waits for no later sample, nor for one
+    /// that was overtaken
     #[arg(
         long,
         default_value = "auto",
@@ -208,10 +208,14 @@ pub struct Estimation {
     pub ignore_covariance_flag: bool,
     /// Class of the sensor: consumer, uncalibrated, industrial, tactical, navigation, or a list
     ///
-    /// In the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw (deg/h/sqrt(h)),
-    /// turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for
-    /// the body axes. The turn-on bias counts unless a bias is removed (--bias); initial is the uncertainty of the initial attitude.
-    /// And one number each: scale-ppm and misalignment (deg), which grow with the angle turned, tilt (deg) of --init gravity.
+    /// In the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw
+    /// (deg/h/sqrt(h)),
+    /// turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or
+    /// three x/y/z for
+    /// the body axes. The turn-on bias counts unless a bias is removed (--bias); initial is the uncertainty of the
+    /// initial attitude.
+    /// And one number each: scale-ppm and misalignment (deg), which grow with the angle turned, tilt (deg) of --init
+    /// gravity.
     #[arg(
         long,
         value_name = "NOISE",

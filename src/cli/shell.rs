@@ -7,8 +7,8 @@ use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use strapd_replay::shell::quoted;
 
-/// Command of this process as outputs keep it: files by their names, without folders, unless `with_paths`; addresses as they
-/// are printed, without passwords and keys.
+/// Command of this process as outputs keep it: files by their names, without folders, unless `with_paths`; addresses
+/// as they are printed, without passwords and keys.
 #[must_use]
 pub fn recorded_command(with_paths: bool) -> String {
     let mut words: Vec<String> = Vec::new();

@@ -63,7 +63,7 @@ fn even(kind: SampleKind, n: i64) -> Vec<RawSample> {
     (0..n).map(|k| raw(kind, k * STEP, RATE)).collect()
 }
 
-/// What came out.
+/// Output of a run.
 struct Run {
     conditioning: condition::Report,
     propagation: propagate::Report,
@@ -114,7 +114,7 @@ struct Case {
     check: fn(&Run, SampleKind, Method),
 }
 
-/// What a step about a fixed axis may be off, rad: rounding, and Runge-Kutta's fifth order.
+/// Error allowed of a step about a fixed axis, rad: rounding, and Runge-Kutta's fifth order.
 fn own_error(method: Method, angle: f64) -> f64 {
     let own = match method {
         Method::Rk4 => (0.5 * angle).powi(5) / 30.0,

@@ -28,7 +28,7 @@ fn found(path: &Path) -> Vec<Finding> {
     )
 }
 
-/// What helps, as the command's flags: here nobody has said how settings are named.
+/// Advice as the command's flags: here nobody has named settings.
 pub(crate) fn flags(finding: &Finding) -> String {
     let sets = finding.help.iter().map(|set| {
         let flag = |choice: &Choice| {

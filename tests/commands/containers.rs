@@ -12,7 +12,7 @@ fn bench(files: &[&str]) -> tempfile::TempDir {
     dir
 }
 
-/// What was lost is said, and nothing else went wrong.
+/// Asserts that what was lost is reported, and nothing else went wrong.
 #[track_caller]
 fn lossy(ran: &Ran) -> &Ran {
     assert_eq!(ran.code, Some(3), "{ran:?}");

@@ -1,5 +1,5 @@
-//! Promise: a folder that a phone or a recorder wrote is a recording: one file has the rates, those beside it what corrects
-//! them, paired by their stamps. What is used is said; what can not be told is not guessed.
+//! Promise: a folder that a phone or a recorder wrote is a recording: one file has the rates, those beside it what
+//! corrects them, paired by their stamps. What is used is said; what can not be told is not guessed.
 
 use crate::program::{Ran, strapd, strapd_fed};
 use crate::replays::fixture;
@@ -54,7 +54,7 @@ fn phone(at: &Path) -> Phone {
     }
 }
 
-/// As Sensor Logger writes it: columns z, y, x.
+/// Table as Sensor Logger writes it: columns z, y, x.
 fn sensor_logger(rows: &[Row], by: f64) -> String {
     let mut text = "time,seconds_elapsed,z,y,x\n".to_owned();
     for (stamp, v) in rows {
@@ -348,7 +348,7 @@ fn files_that_name_their_columns_are_told_by_them() {
     assert!(ran.out.contains("aid      none"), "{}", ran.out);
 }
 
-/// As an x-IMU3 leaves it: the force stands beside the rate, and another accelerometer has a file of its own.
+/// Folder as an x-IMU3 leaves it: the force stands beside the rate, and another accelerometer has a file of its own.
 #[test]
 fn a_force_in_the_rows_of_the_rates_is_not_looked_for_elsewhere() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Promise: who integrates in the sensor is believed: turns are multiplied as they are, and steps of time are where the rows
+//! Promise: who integrates in the sensor is believed: turns are multiplied as they are, and steps of time are where
+//! the rows
 //! lie. The truth is exact: the attitude of a cone at every instant, and the quotients of its neighbours as increments.
 
 use crate::program::{strapd, strapd_fed};
@@ -33,7 +34,7 @@ fn inverse([w, x, y, z]: [f64; 4]) -> [f64; 4] {
     [w, -x, -y, -z]
 }
 
-/// From one instant to another.
+/// Rotation from one instant to another.
 fn between(from: f64, to: f64) -> [f64; 4] {
     product(inverse(cone(from)), cone(to))
 }

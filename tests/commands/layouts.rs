@@ -1,14 +1,14 @@
-//! Promise: the layouts in `packaging/layouts` can be read, and name only topics, fields and frames that `strapd replay`
-//! writes: what a viewer shows at once is not an empty panel.
+//! Promise: the layouts in `packaging/layouts` can be read, and name only topics, fields and frames that `strapd
+//! replay` writes: what a viewer shows at once is not an empty panel.
 
 use crate::program::strapd;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What the layouts are for.
+/// Topic of the layouts.
 const TOPIC: &str = "/imu/data/attitude";
-/// What the script in Lichtblick's layout makes.
+/// Topic that the script in Lichtblick's layout makes.
 const MADE: &str = "/studio_script/angles";
 
 fn layout(name: &str) -> String {

@@ -1,4 +1,4 @@
-//! What the command line does, as its users meet it: every command over logs of every kind, and what it writes.
+//! Tests of the command line as its users meet it: every command over logs of every kind, and what it writes.
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(
     clippy::duplicate_mod,

@@ -1,11 +1,14 @@
 //! Promise: every command in `README.md` and `docs/` does what its page says.
 //!
 //! What stands in a fence marked `sh` is run by `bash`, block by block, page by page, in a folder of its own that holds
-//! `fixtures/` and recordings of the names that pages use (`flight.mcap`, ...). Every line ends with code 0, or with the one its
-//! comment names (`exit code 3`), and leaves the files that it names. In `docs/` a line takes the place of one before it that wrote the same files. Behind `untested:` in a comment stands why a line is not run
+//! `fixtures/` and recordings of the names that pages use (`flight.mcap`, ...). Every line ends with code 0, or with
+//! the one its
+//! comment names (`exit code 3`), and leaves the files that it names. In `docs/` a line takes the place of one before
+//! it that wrote the same files. Behind `untested:` in a comment stands why a line is not run
 //! (in a line of its own: the rest of its block); it is held against the parser all the same, and counted here.
 //!
-//! Two things are not as printed: `cargo run --release --` is the command under test, and every address of this machine has a free port.
+//! Two things are not as printed: `cargo run --release --` is the command under test, and every address of this
+//! machine has a free port.
 
 mod fences;
 mod quoted;
@@ -23,7 +26,7 @@ const ELSEWHERE: [(&str, &str); 3] = [
     ("cargo bench", "measures for minutes"),
 ];
 
-/// How many lines of a page are not run here. A line more is to be looked at.
+/// Number of lines of a page that are not run here. A line more is to be looked at.
 const UNTESTED: [(&str, usize); 8] = [
     ("README.md", 3),
     ("docs/estimation.md", 1),

@@ -31,7 +31,7 @@ fn recover(input: &Path, output: &Path, threads: usize) -> Recovered {
 /// A message with all its numbers: topic, log time, publish time, sequence, payload.
 type Whole = (String, u64, u64, u32, Vec<u8>);
 
-/// What the guarded walk yields, in file order.
+/// Messages that the guarded walk yields, in file order.
 fn walked(path: &Path) -> (Vec<Whole>, Survey) {
     let mut all = Vec::new();
     let options = WalkOptions {
@@ -56,7 +56,7 @@ fn walked(path: &Path) -> (Vec<Whole>, Survey) {
     (all, report.survey)
 }
 
-/// What the `mcap` crate reads, in file order; its summary must hold together and count the same.
+/// Messages that the `mcap` crate reads, in file order; its summary must hold together and count the same.
 fn by_the_crate(bytes: &[u8]) -> Vec<Whole> {
     let summary = mcap::Summary::read(bytes).unwrap().expect("a summary");
     let all: Vec<Whole> = mcap::MessageStream::new(bytes)

@@ -28,13 +28,13 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (-2.0 * u.ln()).sqrt() * v.cos()
 }
 
-/// What was measured, when it truly was, and the truth then.
+/// Log of what was measured, when it truly was, and the truth then.
 struct Log {
     raw: Vec<RawSample>,
     truth: Vec<Quaternion<Nav, Body>>,
 }
 
-/// Where a log's jitter is.
+/// Faults of a log: where its jitter is.
 #[derive(Clone, Copy)]
 struct Faults {
     /// Standard deviation of the stamps' noise, parts of a step: stamps lie, sampling is even.

@@ -22,7 +22,7 @@ fn figure<'h>(html: &'h str, id: &str) -> Option<&'h str> {
     Some(rest.split_once("</figure>").expect("its end").0)
 }
 
-/// What a policy calls a script: 256 bits are 43 letters and a `=`.
+/// Hash by which a policy names a script: 256 bits are 43 letters and a `=`.
 fn hash(script: &str) -> String {
     use sha2::{Digest as _, Sha256};
     let digest = Sha256::digest(script.as_bytes());
@@ -44,7 +44,7 @@ fn hash(script: &str) -> String {
     format!("'sha256-{text}='")
 }
 
-/// What every page about one log must be, whatever the log.
+/// Asserts what holds of every page about one log, whatever the log.
 #[track_caller]
 fn is_sound(html: &str) -> Value {
     asks_nobody(html);
@@ -54,7 +54,7 @@ fn is_sound(html: &str) -> Value {
     data
 }
 
-/// What every page must be.
+/// Asserts what holds of every page.
 #[track_caller]
 fn asks_nobody(html: &str) {
     assert!(html.len() <= 2_000_000, "{} bytes", html.len());

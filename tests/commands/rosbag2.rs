@@ -117,7 +117,7 @@ fn a_database_cut_short_exits_with_3_and_one_of_something_else_says_which_table_
     strapd(at, "replay x.db").refused(1, &["x.db", "no table", "messages"]);
 }
 
-/// As the oracle adds up messages.
+/// Sums of messages, as the oracle has them.
 fn sum(path: &Path) -> (u64, String, u64) {
     let options = WalkOptions {
         order: Order::File,

@@ -1,4 +1,4 @@
-//! What leaves strapd: whole files, the same bytes every time, readable by others, and nothing at
+//! Outputs of strapd: whole files, the same bytes every time, readable by others, and nothing at
 //! all where there should be nothing.
 
 use std::collections::BTreeMap;

@@ -110,7 +110,7 @@ fn a_format_that_says_more_than_a_line_gives_the_same_attitudes_through_lines_an
     }
 }
 
-/// From the file, standard input, `cat` in a pipe and a file of its lines.
+/// Asserts the same from the file, standard input, `cat` in a pipe and a file of its lines.
 fn same_every_way(log: &Path, dir: &Path) {
     let what = log.display();
     let from_file = printed(strapd().arg("replay").arg(log).args(["-o", "-"]));

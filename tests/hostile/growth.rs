@@ -14,21 +14,21 @@ use std::process::Command;
 /// Lengths of inputs, bytes.
 const LENGTHS: [usize; 3] = [16_000, 32_000, 64_000];
 
-/// What the setup of a parser may cost beside its input: buffers, tables of names, the first use of a schema.
+/// Cost of a parser's setup beside its input: buffers, tables of names, the first use of a schema.
 const CONSTANT: u64 = 300_000;
 
 /// Twice, and what a search in a sorted table of twice the size takes longer (a part in 14 here), and the steps in
 /// which memory grows.
 const FACTOR: f64 = 2.3;
 
-/// What is counted: valgrind finds it by this name.
+/// Parses what is counted: valgrind finds it by this name.
 #[inline(never)]
 fn counted_parse(parse: fn(&[u8]), input: &[u8]) {
     parse(std::hint::black_box(input));
     std::hint::black_box(());
 }
 
-/// What it is fed, whose making is counted apart.
+/// Makes the input, whose making is counted apart.
 #[inline(never)]
 fn made_input(case: &Case, length: usize) -> Vec<u8> {
     std::hint::black_box((case.input)(length))

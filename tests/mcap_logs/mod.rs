@@ -9,7 +9,7 @@ use strapd_recording::mcap::{Message, Reader, WalkOptions, WalkReport, walk};
 /// A message as it was read: topic, log time, sequence, payload.
 pub type Read = (String, u64, u32, Vec<u8>);
 
-/// How a log is packed; `None` for unchunked.
+/// Packing of a log; `None` for unchunked.
 pub type Packing = Option<Option<mcap::Compression>>;
 
 pub const PACKINGS: [(&str, Packing); 4] = [
@@ -27,7 +27,7 @@ pub fn random(state: &mut u64) -> u64 {
     *state >> 33
 }
 
-/// What `log` writes: `n` messages on two topics, `jitter` ns of disorder in log time.
+/// Messages that `log` writes: `n` on two topics, `jitter` ns of disorder in log time.
 pub fn messages(n: u32, jitter: u64) -> Vec<Read> {
     let mut state = 7;
     (0..n)
@@ -83,7 +83,7 @@ pub fn log(packing: Packing, chunk: u64, messages: &[Read]) -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-/// In the order the walk promises: log time, then place in the file.
+/// Messages in the order the walk promises: log time, then place in the file.
 pub fn in_order(mut messages: Vec<Read>) -> Vec<Read> {
     messages.sort_by_key(|m| m.1);
     messages
@@ -151,7 +151,7 @@ pub fn on_disk(bytes: &[u8], dir: &Path, name: &str) -> Reader {
     Reader::open(&path).unwrap()
 }
 
-/// By the `mcap` crate alone: where each stretch of the file that stands or falls together ends, and
+/// Stretches by the `mcap` crate alone: where each part of the file that stands or falls together ends, and
 /// the messages in it. Chunks by its summary; unchunked messages by its linear reader's record sizes.
 pub fn stretches(bytes: &[u8]) -> Vec<(usize, Vec<Read>)> {
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();

@@ -8,7 +8,7 @@ pub use bounded::ended;
 use std::path::Path;
 use std::process::Command;
 
-/// How a command ended.
+/// Outcome of a command.
 #[derive(Debug)]
 pub struct Ran {
     pub code: Option<i32>,

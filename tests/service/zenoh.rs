@@ -48,7 +48,7 @@ mod built_with_it {
         judged("zenoh_robot.py", "faults", "counted for 206 bad messages");
     }
 
-    /// It measures for 20 s at 10,000 messages a second.
+    /// Measures for 20 s at 10,000 messages a second.
     #[test]
     #[ignore = "long: .ci/full brokers"]
     fn a_robot_is_not_held_up_by_a_reader_that_stands_still() {

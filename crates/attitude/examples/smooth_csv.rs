@@ -6,7 +6,8 @@
 //!
 //! Columns: t_ns, gyro (rad/s), force (m/s^2), field (uT), reference (w, x, y, z; sensor to east, north, up), scored.
 //! Errors are those of earth axes; 6D is turned about the vertical so that its heading agrees at the first sample
-//! that is scored, 9D is not. Settings: process (0: independent nodes), unresolved, loose, untruncate, spacing, delay, threads, instant, every, offset, moving.
+//! that is scored, 9D is not. Settings: process (0: independent nodes), unresolved, loose, untruncate, spacing,
+//! delay, threads, instant, every, offset, moving.
 
 #![allow(clippy::print_stdout)]
 
@@ -30,7 +31,7 @@ struct Recording {
     references: Vec<Option<[f64; 4]>>,
 }
 
-/// What is left out of a recording.
+/// Part that is left out of a recording.
 #[derive(Clone, Copy)]
 struct Cut {
     every: usize,

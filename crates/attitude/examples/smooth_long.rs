@@ -1,4 +1,4 @@
-//! What smoothing a long recording costs: made on the fly, never held.
+//! Cost of smoothing a long recording: made on the fly, never held.
 //!
 //! ```text
 //! cargo run --release -p strapd-attitude --example smooth_long -- HOURS HERTZ [field] [THREADS]

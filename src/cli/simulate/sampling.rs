@@ -42,8 +42,8 @@ impl From<ForceArg> for ForceSampling {
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Sampling")]
 pub struct Common {
-    /// Output for the samples: .mcap, .ndjson, .csv or .parquet (.tum: the true attitude alone), - (NDJSON on stdout), null: (nowhere);
-    /// tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects);
+    /// Output for the samples: .mcap, .ndjson, .csv or .parquet (.tum: the true attitude alone), - (NDJSON on
+    /// stdout), null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects);
     /// tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens). May be given
     /// several times
     #[arg(
@@ -133,7 +133,8 @@ pub struct Common {
     #[arg(long, help_heading = "Sampling", value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Errors of the sensor: none, a preset (consumer_mems, industrial_mems, tactical, navigation, ...; with
-    /// accelerometer and magnetometer consumer_imu, industrial_imu, rough_imu), or terms in the units of data sheets: arw=0.15,bias-instability=0.5,...
+    /// accelerometer and magnetometer consumer_imu, industrial_imu, rough_imu), or terms in the units of data sheets:
+    /// arw=0.15,bias-instability=0.5,...
     #[arg(
         long,
         value_name = "NOISE",

@@ -21,7 +21,7 @@ fn resting(dir: &Path, name: &str, secs: u32) {
     std::fs::write(dir.join(name), lines.join("\n") + "\n").unwrap();
 }
 
-/// Of the gyro's scales.
+/// Sigma of the gyro's scales.
 fn gyro_sigma(dir: &Path, name: &str) -> f64 {
     let gyro = saved(dir, name).gyro.unwrap();
     let squares = [0, 4, 8].map(|i| gyro.sigma_of(i).unwrap().powi(2));

@@ -1,4 +1,4 @@
-//! What a recorded orientation says of the gyro's bias and of sigma, and what it must not be believed in.
+//! Findings of a recorded orientation about the gyro's bias and sigma, and what it must not be believed in.
 
 use super::{codes, flags, found};
 use crate::made_logs::{ImuSample, START, written};

@@ -12,11 +12,11 @@ const N: i64 = 200;
 /// A clock's number at the n-th sample.
 type Count = fn(i64) -> i64;
 
-/// How a log is written: message encoding, schema, and a message with this stamp.
+/// Kind of a log: message encoding, schema, and a message with this stamp.
 struct Kind {
     encoding: &'static str,
     schema: Vec<u8>,
-    /// Of a whole number, and of one with a fraction.
+    /// Message with a whole number, and with a fraction.
     whole: fn(i64) -> Vec<u8>,
     float: fn(f64) -> Vec<u8>,
 }

@@ -4,7 +4,7 @@ use super::{bench, names, strapd};
 use crate::program::strapd_fed;
 use std::path::Path;
 
-/// What a pattern of the shell makes of `*.mcap`, and the like.
+/// Expansion by the shell of `*.mcap`, and the like.
 fn pattern(at: &Path, ending: &str) -> String {
     let mut found = names(at);
     found.retain(|name| name.ends_with(ending));

@@ -38,7 +38,7 @@ fn completions_for_every_shell_know_every_command() {
     strapd(dir.path(), "completions csh").refused(2, &["csh", "bash"]);
 }
 
-/// What the generated script of bash offers behind a flag of a command.
+/// Words that the generated script of bash offers behind a flag of a command.
 fn offered(script: &str, command: &str, flag: &str) -> String {
     let case = script
         .split_once(&format!("\n        strapd__subcmd__{command})\n"))

@@ -1,4 +1,4 @@
-//! What is printed to be pasted does what it says, whatever a log calls its topics and whoever named the file.
+//! Promise: text that is printed to be pasted works, whatever a log calls its topics and whoever named the file.
 
 use crate::made_logs::{bytes, logged, motion};
 use std::ffi::OsStr;

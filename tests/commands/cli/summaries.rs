@@ -1,4 +1,4 @@
-//! What a run says of itself: text, `--json`, `--progress json`, `info`, `compare`, `cat`.
+//! Account of a run: text, `--json`, `--progress json`, `info`, `compare`, `cat`.
 
 use super::{bench, strapd};
 use crate::replays::fixture;

@@ -1,6 +1,6 @@
 //! A page in Markdown -> its fenced blocks -> their commands. Pure.
 
-/// What stands between two fences.
+/// Block between two fences.
 #[derive(Debug)]
 pub(super) struct Block {
     /// The line of the opening fence, from 1.
@@ -13,9 +13,9 @@ pub(super) struct Block {
 /// A command of a block: a line, or several that belong together.
 #[derive(Debug)]
 pub(super) struct Command {
-    /// Its first line in the page, from 1.
+    /// First line in the page, from 1.
     pub(super) line: usize,
-    /// Without its comment.
+    /// Text without its comment.
     pub(super) text: String,
     /// The exit code that its comment names.
     pub(super) code: i32,

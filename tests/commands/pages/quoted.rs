@@ -1,4 +1,4 @@
-//! What pages quote that is no command: the library's first example, and the summary of a replay.
+//! Quotations of pages that are no command: the library's first example, and the summary of a replay.
 
 use super::fences::blocks;
 use super::root;

@@ -11,8 +11,8 @@ use std::thread::JoinHandle;
 /// Ports that stand in pages.
 const PORTS: [&str; 7] = ["4550", "4551", "8765", "8766", "9870", "8000", "7000"];
 
-/// In front of a block: what does not end by itself is interrupted as soon as it is ready, as by Ctrl-C; what runs beside it at the
-/// end is given some time to end, then ended.
+/// Mark in front of a block: what does not end by itself is interrupted as soon as it is ready, as by Ctrl-C; what
+/// runs beside it at the end is given some time to end, then ended.
 const FRAME: &str = r#"
 set -o pipefail
 until_ctrl_c() {
@@ -59,7 +59,7 @@ pub(super) struct Place {
     free: Vec<String>,
 }
 
-/// How a command ended.
+/// Outcome of a command.
 #[derive(Debug)]
 pub(super) struct Ran {
     pub(super) code: i32,
@@ -68,7 +68,7 @@ pub(super) struct Ran {
 }
 
 impl Place {
-    /// With `fixtures/`, and nothing else.
+    /// Makes a place with `fixtures/`, and nothing else.
     pub(super) fn with_fixtures() -> Place {
         let dir = tempfile::tempdir().unwrap();
         for folder in ["fixtures", "fixtures/source"] {
@@ -101,7 +101,7 @@ impl Place {
         place
     }
 
-    /// With what the pages call their recordings: a sensor in a hand, with a magnetometer and rests, and its truth.
+    /// Adds what the pages call their recordings: a sensor in a hand, with a magnetometer and rests, and its truth.
     pub(super) fn with_recordings() -> Place {
         let place = Place::with_fixtures();
         let simulated = "simulate hand --duration 12 --rate-hz 100 --noise consumer_imu --mag -o flight.mcap -o truth.csv";
@@ -258,7 +258,7 @@ pub(super) fn missing(text: &str) -> Option<&'static str> {
         .find(|name| text.contains(&format!("{name} ")) && !is_there(name))
 }
 
-/// What a thread has found, or its panic.
+/// Faults that a thread has found, or its panic.
 pub(super) fn finish(thread: JoinHandle<Vec<String>>) -> Vec<String> {
     thread
         .join()

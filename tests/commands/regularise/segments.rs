@@ -1,4 +1,4 @@
-//! Where segments end, what is refused, and what holds for any stamps at all.
+//! Ends of segments, refusals, and what holds for any stamps at all.
 
 use super::{START, STEP, causal, conditioned, lines, normal, offline, through};
 use proptest::prelude::*;

@@ -18,7 +18,7 @@ fn every_offset() -> bool {
     std::env::var_os("STRAPD_EVERY_OFFSET").is_some()
 }
 
-/// Where the last whole record before the end of `bytes` ends: nine bytes of head (opcode, length),
+/// End of the last whole record before the end of `bytes`: nine bytes of head (opcode, length),
 /// then the body.
 pub(crate) fn whole_records(bytes: &[u8]) -> usize {
     record_ends(bytes).last().copied().unwrap_or(MAGIC)
@@ -43,7 +43,7 @@ fn record_ends(bytes: &[u8]) -> Vec<usize> {
     ends
 }
 
-/// For each stretch of the file that stands or falls together: where it ends, and the samples in
+/// Ends of each stretch of the file that stands or falls together, and the samples in
 /// it. Chunks by the `mcap` crate's index; unchunked messages record by record.
 fn stretches(bytes: &[u8]) -> Vec<(usize, u64)> {
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();
@@ -101,7 +101,7 @@ fn used(result: &Result<RunSummary, Error>) -> u64 {
     })
 }
 
-/// What a damaged log may end in. Anything else (an `Open`, a `Usage`) would blame the wrong thing.
+/// Asserts how a damaged log may end. Anything else (an `Open`, a `Usage`) would blame the wrong thing.
 fn assert_documented(result: &Result<RunSummary, Error>, what: &str) {
     match result {
         Ok(summary) => {
@@ -242,7 +242,7 @@ fn a_changed_byte_is_never_believed_where_a_checksum_covers_it() {
     }
 }
 
-/// Where the (packed) records of every chunk but the first stand. The first holds the channel: when
+/// Places of the (packed) records of every chunk but the first. The first holds the channel: when
 /// it goes, what its messages are is known by the summary alone.
 fn chunk_payloads(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut from = MAGIC;

@@ -1,4 +1,4 @@
-//! What the flags of the output and of the frames do to the numbers.
+//! Effects of the flags of the output and of the frames on the numbers.
 
 use crate::made_logs::{ImuSample, PACKINGS, START, TOPIC, bytes, logged, motion, written};
 use crate::replays::{Bits, attitudes, done, fixture, mcap, only, replay_of, replay_with, target};

@@ -1,4 +1,4 @@
-//! Which of several times in a message is believed, and what becomes of one that can not be.
+//! Times in a message: which of several is believed, and what becomes of one that cannot be.
 //!
 //! The messages are those of drivers and loggers seen in the wild: a header around a whole Imu message,
 //! stamps cut to seconds, intervals in another unit than the name says.

@@ -1,4 +1,4 @@
-//! In headless Chromium: the page opens from a file, without a complaint and without a request.
+//! Tests in headless Chromium: the page opens from a file, without a complaint and without a request.
 
 use crate::made_logs::{Logged, bytes, imu_message, motion, written};
 use crate::program::strapd;

@@ -1,4 +1,4 @@
-//! What a sensor's errors make of a motion.
+//! Effects of a sensor's errors on a motion.
 
 use super::largest_error;
 use crate::program::strapd;
@@ -59,7 +59,7 @@ fn quaternion(line: &Value) -> Quaternion<Nav, Body> {
     Quaternion::assume_unit(["w", "x", "y", "z"].map(|c| line["q"][c].as_f64().unwrap()))
 }
 
-/// What a run says of its own uncertainty: one standard deviation about each body axis, rad.
+/// Sigma that a run states, one standard deviation about each body axis, rad.
 fn sigma(line: &Value) -> Vector3<f64> {
     Vector3::from_fn(|i, _| line["sigma_deg"][i].as_f64().unwrap().to_radians())
 }

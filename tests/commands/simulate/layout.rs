@@ -1,4 +1,4 @@
-//! What the log of a simulation looks like to others.
+//! Layout of the log of a simulation, as others see it.
 
 use crate::program::strapd;
 use mcap::records::MessageHeader;

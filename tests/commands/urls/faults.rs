@@ -1,4 +1,4 @@
-//! What servers do wrong: it passes and nobody sees it, or it is said.
+//! Faults of servers: they pass and nobody sees them, or they are reported.
 
 use super::fixture;
 use super::server::{Manner, Server};

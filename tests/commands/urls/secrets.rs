@@ -1,4 +1,4 @@
-//! What is secret in an address, or in the environment, is seen by nobody but the server it is for.
+//! Promise: secrets in an address, or in the environment, are seen by nobody but the server they are for.
 
 use super::fixture;
 use super::server::{Manner, Server};

@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// How a server behaves.
+/// Manner of a server.
 #[derive(Clone, Debug)]
 pub(super) enum Manner {
-    /// It knows ranges.
+    /// Server that knows ranges.
     Good,
-    /// It knows none.
+    /// Server that knows none.
     NoRanges,
-    /// It knows none, and cuts the body.
+    /// Server that knows none, and cuts the body.
     NoRangesCut,
     /// A kilobyte at a time.
     Slow,
@@ -24,21 +24,21 @@ pub(super) enum Manner {
     BusyEveryThird,
     /// Every one is; what it says when to come back.
     Busy(&'static str),
-    /// From the so-manyth request on it has another object.
+    /// Server that has another object from the so-manyth request on.
     ChangedAfter(usize),
     /// A body never ends.
     Endless,
-    /// It says a length that is not that of the body.
+    /// Server that states a length that is not that of the body.
     WrongLength,
-    /// It sends everybody on to there.
+    /// Server that sends everybody on to there.
     Elsewhere(String),
-    /// It refuses.
+    /// Server that refuses.
     Refuse(u16),
-    /// It takes requests and says nothing.
+    /// Server that takes requests and says nothing.
     Silent,
-    /// It begins a body and goes on with a byte now and then.
+    /// Server that begins a body and goes on with a byte now and then.
     Dripping,
-    /// It packs what it sends.
+    /// Server that packs what it sends.
     Packed,
 }
 

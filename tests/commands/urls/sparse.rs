@@ -1,4 +1,4 @@
-//! Of a log with many topics only what is wanted is fetched; an index that does not hold is found out.
+//! Promise: of a log with many topics only what is wanted is fetched; an index that does not hold is found out.
 
 use super::server::{Manner, Server};
 use crate::program::strapd;

@@ -1,4 +1,5 @@
-//! Addresses as outputs: an object is there when it is whole, with the bytes of the file, and nothing of it where it is not.
+//! Addresses as outputs: an object is there when it is whole, with the bytes of the file, and nothing of it where it
+//! is not.
 
 use super::fixture;
 use crate::program::Ran;
@@ -10,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// How a store behaves.
+/// Manner of a store.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Manner {
     Good,
@@ -18,11 +19,11 @@ enum Manner {
     BusyEveryThird,
     /// Every third connection ends without an answer, before anything was done.
     CutsEveryThird,
-    /// It makes the object, and the answer is lost.
+    /// Store that makes the object, and whose answer is lost.
     LosesTheLastAnswer,
-    /// It says 200, and in the body that it failed.
+    /// Store that answers 200, and in the body that it failed.
     NeverCompletes,
-    /// It takes no second part.
+    /// Store that takes no second part.
     RefusesTheSecondPart,
     /// A part takes long.
     Slow,
@@ -405,7 +406,7 @@ fn who_is_interrupted_gives_the_parts_up() {
     }
 }
 
-/// What is served after the upload ends in order, as it does where the output is a file.
+/// Checks that what is served after the upload ends in order, as it does where the output is a file.
 #[cfg(unix)]
 #[test]
 fn a_page_that_stays_after_the_upload_ends_in_order() {

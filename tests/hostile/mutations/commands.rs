@@ -16,7 +16,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 use strapd_recording::mcap::{MAGIC, op};
 
-/// What one command may take for one log of some 10 kB, in a debug build on any machine: processor time, s, and
+/// Bounds of one command for one log of some 10 kB, in a debug build on any machine: processor time, s, and
 /// bytes read; they take 5 ms, and read the log a few times.
 const SECS: f64 = if cfg!(debug_assertions) { 4.0 } else { 2.0 };
 const READ: u64 = 64 << 20;
@@ -220,7 +220,7 @@ fn worker() {
     }
 }
 
-/// By so many processes, each with its share.
+/// Runs so many processes, each with its share.
 fn survive(cases: usize, workers: usize) {
     let each = cases.div_ceil(workers);
     let running: Vec<Child> = (0..workers)

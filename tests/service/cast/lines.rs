@@ -1,4 +1,4 @@
-//! What a run writes to standard output, and what a client was sent of it.
+//! Output of a run on standard output, and what a client was sent of it.
 
 use crate::program;
 use crate::serve::client::Client;
@@ -15,7 +15,7 @@ pub(crate) fn lines_of(arguments: &str) -> Vec<String> {
     ran.done().out.lines().map(str::to_owned).collect()
 }
 
-/// Those of a class.
+/// Lines of a class.
 pub(crate) fn of_class(lines: &[String], class: &str) -> Vec<String> {
     let head = format!("{{\"class\":\"{class}\"");
     lines

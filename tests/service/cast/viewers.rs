@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 /// A viewer that speaks one of the sub-protocols.
 struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// What came while something else was waited for: an answer overtakes data, or not.
+    /// Messages that came while another was waited for: an answer overtakes data, or not.
     passed_over: VecDeque<Message>,
 }
 

@@ -1,4 +1,4 @@
-//! Who gets the page, and what a page of somebody else gets.
+//! Admission to the page, and what a page of somebody else gets.
 
 use super::browser::Browser;
 use crate::serve::client::get;

@@ -21,7 +21,7 @@ pub(crate) struct Browser {
     socket: WebSocket<TcpStream>,
     session: Option<String>,
     next: u64,
-    /// What the page did, as the browser told: `method` and `params`.
+    /// Events of the page, as the browser told: `method` and `params`.
     pub(crate) events: Vec<Value>,
     _profile: tempfile::TempDir,
     _turn: MutexGuard<'static, ()>,
@@ -201,7 +201,7 @@ impl Browser {
         [0, 1, 2].map(|n| found[n].as_f64().unwrap())
     }
 
-    /// What a mouse does: `mouseMoved`, `mousePressed`, `mouseReleased`, `mouseWheel`.
+    /// Moves the mouse: `mouseMoved`, `mousePressed`, `mouseReleased`, `mouseWheel`.
     pub(crate) fn mouse(&mut self, kind: &str, at: [f64; 2], more: Value) {
         let mut event = json!({"type": kind, "x": at[0], "y": at[1], "pointerType": "mouse"});
         if let (Some(event), Some(more)) = (event.as_object_mut(), more.as_object()) {
@@ -210,7 +210,7 @@ impl Browser {
         self.call("Input.dispatchMouseEvent", event);
     }
 
-    /// What fingers do: `touchStart`, `touchMove`, `touchEnd`; where those are that are on the screen.
+    /// Moves fingers: `touchStart`, `touchMove`, `touchEnd`; where those are that are on the screen.
     pub(crate) fn fingers(&mut self, kind: &str, at: &[[f64; 2]]) {
         let points: Vec<Value> = at
             .iter()
@@ -269,7 +269,7 @@ impl Browser {
         self.events.iter().filter_map(of).collect()
     }
 
-    /// No script threw, nothing was refused by the policy.
+    /// Asserts that no script threw, and nothing was refused by the policy.
     pub(crate) fn is_unharmed(&mut self) {
         assert_eq!(self.eval("window.__violations"), json!([]));
         for event in &self.events {

@@ -1,11 +1,11 @@
-//! What is drawn is where it should be, and the same every time.
+//! Promise: drawings are where they should be, and the same every time.
 
 use super::browser::Browser;
 use crate::serve::client::Client;
 use crate::serve::daemon::{Daemon, TCP, WS, listening};
 use serde_json::Value;
 
-/// Where the camera stands, and how large an axis is: `src/web/body3d.js`.
+/// Place of the camera, and length of an axis: `src/web/body3d.js`.
 const AZIMUTH_DEG: f64 = -125.0;
 const ELEVATION_DEG: f64 = 24.0;
 const SCALE: f64 = 0.4;

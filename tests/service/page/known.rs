@@ -1,4 +1,4 @@
-//! What is known of an attitude and its sensor on the page, and the button that begins it anew.
+//! Knowledge of an attitude and its sensor on the page, and the button that begins it anew.
 
 use super::admission::elsewhere;
 use super::browser::Browser;

@@ -230,7 +230,7 @@ fn a_keyboard_does_what_a_mouse_does_and_a_screen_reader_hears_it() {
     browser.is_unharmed();
 }
 
-/// Where the plots begin and end, once they no longer show what they did.
+/// Range of the plots, once they no longer show what they did.
 fn range(browser: &mut Browser, before: &Value) -> [f64; 2] {
     browser.until(
         "they show something else",

@@ -1,4 +1,4 @@
-//! What is seen can be kept: rows and a picture, made in the browser and sent nowhere.
+//! Promise: rows and a picture of what is seen can be kept, made in the browser and sent nowhere.
 
 use super::browser::Browser;
 use crate::serve::daemon::{Daemon, PATIENCE, WS, listening};

@@ -11,7 +11,7 @@ use strapd::serve::recorder::{Recorder, Settings};
 
 const TASK: &str = "STRAPD_RECORDER_CHILD";
 
-/// What the child does.
+/// Task of the child.
 #[derive(Clone, Copy)]
 pub(super) enum Task {
     /// Sends so many samples a second until it is killed or gets SIGTERM.

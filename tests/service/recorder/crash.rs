@@ -62,7 +62,7 @@ fn killed(dir: &Path, n: u64, rate_hz: u64, flush_ms: u64, moment: Duration) -> 
     handed.saturating_sub(samples.min(attitudes)) as f64 / rate_hz as f64
 }
 
-/// What `work` gives, and by how much a thread that sleeps for a moment woke too late meanwhile, s: where the machine is
+/// Result of `work`, and by how much a thread that sleeps for a moment woke too late meanwhile, s: where the machine is
 /// busy, nobody does anything in time.
 fn with_lateness<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let done = AtomicBool::new(false);

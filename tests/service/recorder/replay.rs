@@ -1,4 +1,4 @@
-//! What was recorded replays to the attitude of what was received; and what recording costs in size.
+//! Promise: recordings replay to the attitude of what was received; and what recording costs in size.
 
 use super::{assert_whole, attitude, sample};
 use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! Who may come in.
+//! Admission of clients.
 
 use super::client::{Client, ask, get, rate};
 use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};
@@ -307,7 +307,7 @@ fn the_metrics_say_of_each_number_what_is_counted_and_count_that() {
     assert_eq!((value("samples_total"), value("attitudes_total")), (2, 2));
 }
 
-/// What `strapd serve ARGS`, which must not start, says and ends with.
+/// Words and exit code of `strapd serve ARGS`, which must not start.
 fn refused(args: &[&str]) -> (Option<i32>, String) {
     let output = Command::new(strapd())
         .arg("serve")

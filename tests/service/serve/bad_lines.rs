@@ -1,4 +1,4 @@
-//! What is wrong is answered with line and column, counted, and stops nobody.
+//! Promise: bad lines are answered with line and column, counted, and stop nobody.
 
 use super::client::{Client, rate};
 use super::daemon::{Daemon, eventually};

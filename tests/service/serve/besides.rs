@@ -6,7 +6,7 @@ use super::runs::{Fed, Got};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::{Aid, Plan};
 
-/// What `serve` begins with.
+/// Plan with which `serve` begins.
 fn auto() -> Plan {
     Plan {
         aid: Aid::Auto,

@@ -19,7 +19,7 @@ fn cat(args: &[&str]) -> Child {
         .unwrap()
 }
 
-/// In bounded time.
+/// Waits for the output in bounded time.
 fn ended(mut child: Child) -> Output {
     let start = Instant::now();
     while child.try_wait().unwrap().is_none() {

@@ -17,7 +17,7 @@ pub(crate) struct Client {
     objects: VecDeque<Vec<u8>>,
 }
 
-/// What a client is told.
+/// Item that a client is told.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Item {
     Line(String),
@@ -36,7 +36,7 @@ impl Client {
         Client::over(TcpStream::connect(address).unwrap())
     }
 
-    /// From another address of this machine: another peer.
+    /// Connects from another address of this machine: another peer.
     pub(crate) fn from_another(address: SocketAddr) -> Client {
         use socket2::{Domain, Socket, Type};
         let socket = Socket::new(Domain::IPV4, Type::STREAM, None).unwrap();
@@ -235,7 +235,7 @@ fn item(from: &mut impl BufRead) -> Option<Item> {
     Some(Item::Line(line.trim_end_matches('\n').to_owned()))
 }
 
-/// What was read; `None` when the daemon has closed without a word.
+/// Bytes that were read; `None` when the daemon has closed without a word.
 fn there<T>(read: std::io::Result<T>) -> Option<T> {
     match read {
         Ok(read) => Some(read),
@@ -262,7 +262,7 @@ pub(crate) fn get(address: SocketAddr, path: &str, headers: &[(&str, &str)]) -> 
     ask(address, &format!("GET {path}"), headers, b"")
 }
 
-/// As [`get`] for any request: method and target, headers, body.
+/// Sends any request, otherwise as [`get`]: method and target, headers, body.
 pub(crate) fn ask(
     address: SocketAddr,
     what: &str,

@@ -406,8 +406,8 @@ fn a_source_that_names_no_packed_stream_is_complained_of_and_left() {
     });
 }
 
-/// What a `PACKED` line says of a source's samples holds, attitudes are the samples that their lines would be, and
-/// of two sensors that would be one the second is refused.
+/// Checks that what a `PACKED` line states of a source's samples holds, attitudes are the samples that their lines
+/// would be, and of two sensors that would be one the second is refused.
 #[test]
 fn a_source_is_read_packed_as_its_lines_are() {
     let head = [

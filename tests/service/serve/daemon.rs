@@ -35,7 +35,7 @@ pub(crate) const UDP: &str = "udp-listen://127.0.0.1:0";
 pub(crate) const WS: &str = "ws-listen://127.0.0.1:0";
 
 impl Daemon {
-    /// On TCP alone.
+    /// Starts one on TCP alone.
     pub(crate) fn tcp() -> Daemon {
         Daemon::start(listening(&[TCP]))
     }
@@ -113,7 +113,7 @@ pub(crate) fn eventually(what: &str, mut done: impl FnMut() -> bool) {
 pub(crate) struct Process {
     pub(crate) child: Child,
     pub(crate) addresses: Vec<String>,
-    /// What was logged up to the ready line.
+    /// Log up to the ready line.
     pub(crate) early: String,
     pub(crate) log: BufReader<ChildStderr>,
 }
@@ -237,7 +237,7 @@ impl Process {
         assert!(done.success());
     }
 
-    /// Its exit code, in bounded time.
+    /// Exit code, in bounded time.
     pub(crate) fn exit(&mut self) -> Option<i32> {
         let start = Instant::now();
         loop {

@@ -72,7 +72,7 @@ fn the_clock_on_the_wall_changes_no_bit() {
     assert!(with(&|n| now - n * 1_000_000) == undisturbed);
 }
 
-/// What was done to a stream.
+/// Faults injected into a stream.
 #[derive(Default, Debug, PartialEq)]
 struct Injected {
     dropped: u64,

@@ -24,7 +24,7 @@ fn frame(opcode: u8, payload: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     out
 }
 
-/// After the handshake.
+/// Opens a connection and completes the handshake.
 fn open(address: SocketAddr) -> TcpStream {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();

@@ -18,7 +18,7 @@ fn lines(kind: &str, dt: &str, from: u64, n: u64) -> String {
         .collect()
 }
 
-/// What is said to who sends this on one connection.
+/// Answers to who sends this on one connection.
 fn said(daemon: &Daemon, sent: &str) -> Vec<Value> {
     let mut sender = Client::tcp(daemon.address(0));
     sender.object("VERSION");

@@ -1,4 +1,4 @@
-//! Who comes late gets the last attitude of every sensor at once, and everything after it: nothing
+//! Promise: a late subscriber gets the last attitude of every sensor at once, and everything after it: nothing
 //! between is lost, nothing doubled.
 
 use super::client::{Client, rate};

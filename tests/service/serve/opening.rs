@@ -1,5 +1,5 @@
-//! Who does not begin with an object is not listened to: what a browser can be made to send to the port
-//! of lines never becomes a sample.
+//! Promise: a client that does not begin with an object is not listened to: what a browser can be made to send to the
+//! port of lines never becomes a sample.
 
 use super::client::{Client, rate};
 use super::daemon::{Daemon, Process, TCP, WS, eventually, listening};
@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::io::{BufRead, Read, Write};
 use std::net::TcpStream;
 
-/// What a browser sends for a page that posts samples as text, to which no server has to agree.
+/// Request that a browser sends for a page that posts samples as text, to which no server has to agree.
 fn post(body: &str) -> String {
     format!(
         "POST / HTTP/1.1\r\nHost: 127.0.0.1:4550\r\nConnection: keep-alive\r\nContent-Length: {}\r\n\
@@ -25,7 +25,7 @@ fn samples(id: &str) -> String {
     (0..10).map(|n| rate(id, n, 1.0) + "\n").collect()
 }
 
-/// No sensor is known, and none of what was sent was taken.
+/// Asserts that no sensor is known, and none of what was sent was taken.
 fn is_untouched(daemon: &Daemon) {
     let status = daemon.status();
     assert_eq!(status["sources"], serde_json::json!([]), "{status}");

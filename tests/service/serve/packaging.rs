@@ -1,4 +1,4 @@
-//! What `packaging/` says is so: service manager, sockets passed, watchdog.
+//! Promises of `packaging/`: service manager, sockets passed, watchdog.
 
 use super::client::Client;
 use super::daemon::{PATIENCE, Process, TCP, strapd};

@@ -25,7 +25,7 @@ fn post(daemon: &Daemon, n: usize, headers: &[(&str, &str)], body: &str) -> (u16
     (status, object)
 }
 
-/// What Sensor Logger pushes: its sensors together, one object of one line.
+/// Body that Sensor Logger pushes: its sensors together, one object of one line.
 fn pushed(message: u64, first: u64, count: u64) -> String {
     let of = |name: &str, n: u64, x: f64| {
         json!({"name": name, "time": 1_700_000_000_000_000_000_u64 + n * 10_000_000,

@@ -38,7 +38,7 @@ fn yaw(attitude: &str) -> f64 {
     sin.atan2(cos).to_degrees()
 }
 
-/// Of the one sensor of a daemon without sockets.
+/// Status of the one sensor of a daemon without sockets.
 fn source(daemon: &Fed) -> Value {
     let mut status: Value = serde_json::from_slice(&daemon.hub.status()).unwrap();
     status["sources"][0].take()

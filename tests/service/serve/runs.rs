@@ -39,11 +39,11 @@ pub(crate) struct Fed {
     scratch: Scratch,
 }
 
-/// What came of some lines.
+/// Outcome of some lines.
 #[derive(Debug, Default)]
 pub(crate) struct Got {
     pub(crate) attitudes: Vec<String>,
-    /// To who sent them.
+    /// Answers to who sent them.
     pub(crate) said: Vec<Value>,
 }
 
@@ -206,7 +206,7 @@ fn who_begins_further_back_than_the_window_begins_a_run() {
     assert_eq!(daemon.send(301..305).codes("NOTE"), ["new_run"]);
 }
 
-/// What a sensor may be understood by.
+/// Plans by which a sensor may be understood.
 fn plans() -> Vec<(&'static str, Plan)> {
     let of = |change: &dyn Fn(&mut Plan)| {
         let mut plan = Plan::default();

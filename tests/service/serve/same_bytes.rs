@@ -119,7 +119,7 @@ fn check(log: &Path) {
 /// Samples of most recordings that are sent: past the first seconds, where steps are learnt, and past gaps.
 const MANY: usize = 4000;
 
-/// What `strapd ARGS` prints, whether or not samples were lost on the way; `None` where it can not begin.
+/// Output of `strapd ARGS`, whether or not samples were lost on the way; `None` where it cannot begin.
 fn printed(args: &[&str], input: &[u8]) -> Option<Vec<u8>> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("input");

@@ -1,4 +1,4 @@
-//! What nobody is to see stands in nothing that is printed, logged, served or written.
+//! Promise: secrets stand in nothing that is printed, logged, served or written.
 
 use super::client::{Client, get, rate};
 use super::daemon::{Process, TCP, WS, strapd};
@@ -9,9 +9,9 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// In every token, password and value of a query.
+/// Secret in every token, password and value of a query.
 const SECRET: &str = "s3cret";
-/// In the names of folders, which the user's own terminal may show.
+/// Folder in paths, which the user's own terminal may show.
 const FOLDER: &str = "h0me-of-ada";
 const LOG: &str = "fixtures/xsens_mti.mcap";
 

@@ -21,7 +21,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// What `replay` makes of the log with the method of a daemon.
+/// Attitudes that `replay` makes of the log with the method of a daemon.
 fn replayed() -> Vec<Value> {
     let output = run(&["replay", LOG, "--method", "commit", "-o", "-"]);
     assert!(output.status.success(), "{}", said(&output));

@@ -15,9 +15,9 @@ const SENSORS: usize = 1000;
 const STORMERS: usize = 100;
 /// Bytes each of them sends: 4 MB in all.
 const EACH: usize = 40_000;
-/// What nobody may be kept waiting for: a fifth of a second, ten times over for the load beside.
+/// Time for which nobody may be kept waiting: a fifth of a second, ten times over for the load beside.
 const LATE: Duration = Duration::from_secs(2);
-/// It took 19.6 s before who asks for much was made to wait.
+/// Time it took before who asks for much was made to wait: 19.6 s; the bound is below.
 const FROZEN: Duration = Duration::from_secs(8);
 
 /// A daemon with a thousand sensors, and who sends them.

@@ -1,4 +1,4 @@
-//! What conditioning promises, sample by sample and over whole streams.
+//! Promises of conditioning, sample by sample and over whole streams.
 
 mod coarse;
 mod recordings;
@@ -42,7 +42,7 @@ fn run(settings: &Settings, raw: &[RawSample]) -> (Vec<RateSample>, Report) {
     (out, conditioner.report().clone())
 }
 
-/// What was injected into a stream.
+/// Faults injected into a stream.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Injected {
     repeated: u64,

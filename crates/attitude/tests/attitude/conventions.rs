@@ -1,4 +1,4 @@
-//! What every sign, order and direction means, each with a witness that a transpose, a swapped order
+//! Meaning of every sign, order and direction, each with a witness that a transpose, a swapped order
 //! or a half conversion would fail. The document's wrong equations are named and refuted
 //! (docs/top.md).
 

@@ -1,4 +1,4 @@
-//! What must hold for any stream: bounds, invariances, and that nothing a sensor may say breaks the state.
+//! Properties that must hold for any stream: bounds, invariances, and that nothing a sensor may say breaks the state.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -143,7 +143,7 @@ fn spacing() -> impl Strategy<Value = i64> {
     ]
 }
 
-/// Where an increment says it began, before its own stamp.
+/// Start that an increment states, before its own stamp.
 fn length() -> impl Strategy<Value = Option<i64>> {
     prop_oneof![
         30 => Just(None),

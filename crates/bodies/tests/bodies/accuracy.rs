@@ -1,4 +1,4 @@
-//! How far from truth the propagator is, in degrees and arc seconds, against motions known otherwise.
+//! Errors of the propagator, in degrees and arc seconds, against motions known otherwise.
 //! The tables are those of `docs/theory/attitude.md` 6 and docs/top.md.
 
 mod bursts;

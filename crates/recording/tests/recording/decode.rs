@@ -14,7 +14,7 @@ mod writer;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Channel, Decoder, Options, Undecodable};
 
-/// When the test's messages were received and sent.
+/// Time at which the test's messages were received and sent.
 const LOG: Nanos = Nanos(1_700_000_000_500_000_000);
 const PUBLISH: Nanos = Nanos(1_700_000_000_400_000_000);
 

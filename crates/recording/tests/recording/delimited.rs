@@ -1,5 +1,5 @@
-//! Promise: tables of text are read whoever wrote them, what they mean is said, and what can not be told is refused with
-//! the flag that tells it.
+//! Promise: tables of text are read whoever wrote them, what they mean is said, and what can not be told is refused
+//! with the flag that tells it.
 //!
 //! The files are written here, after their makers' documentation; real ones are read in `tests/commands/tables.rs`.
 
@@ -19,11 +19,11 @@ const START: i64 = 1_700_000_000_000_000_000;
 const STEP: i64 = 10_000_000;
 const ROWS: usize = 60;
 
-/// What a table gave.
+/// Contents of a table.
 #[derive(Debug, PartialEq, Default)]
 pub struct Given {
     pub samples: Vec<RawSample>,
-    /// Of rows that are none, the line and why.
+    /// Lines that are no rows, and why.
     pub bad: Vec<(u64, String)>,
     pub assumed: String,
     pub notes: Vec<String>,

@@ -1,4 +1,4 @@
-//! What the MCAP reader promises: the messages that are there, in one order, whatever the file, the
+//! Promises of the MCAP reader: the messages that are there, in one order, whatever the file, the
 //! threads and the damage; and that it says what is not there.
 
 use crate::mcap_logs::fine;

@@ -1,5 +1,5 @@
-//! Recordings of ROS 2 in SQLite: the messages of the log they were made of, from files and pipes, with and without what
-//! a killed recorder left beside them; cut, and with each page lost in turn.
+//! Recordings of ROS 2 in SQLite: the messages of the log they were made of, from files and pipes, with and without
+//! what a killed recorder left beside them; cut, and with each page lost in turn.
 
 use crate::made_databases::{Message, Topic, database, sealed};
 use crate::mcap_logs::{Read, from_bytes, read, read_some};
@@ -8,7 +8,7 @@ use strapd_recording::format::Format;
 use strapd_recording::mcap::{ProblemKind, Reader, WalkOptions, WalkReport};
 
 const PAGE: usize = 4096;
-/// Which page of the recording has its topics, from 0.
+/// Page of the recording that has its topics, from 0.
 const TOPICS: usize = 3;
 
 fn fixture(name: &str) -> PathBuf {
@@ -29,14 +29,14 @@ fn told(list: Vec<Read>) -> Told {
     list.into_iter().map(short).collect()
 }
 
-/// What the recordings were made of: each instant's sample, then its truth, of the first hundred.
+/// Samples and truths of which the recordings were made, of the first hundred instants.
 fn expected() -> Told {
     let mut all = told(read(Reader::open(&fixture("constant_rate.mcap")).unwrap()).0);
     all.truncate(200);
     all
 }
 
-/// How many of them the killed recorder had taken, in the database, and with each transaction beside it.
+/// Numbers of them that the killed recorder had taken, in the database, and with each transaction beside it.
 const KILLED: [usize; 3] = [48, 64, 80];
 
 fn kinds(report: &WalkReport) -> Vec<ProblemKind> {

@@ -1,4 +1,4 @@
-//! What was put in comes out again.
+//! Promise: the noise that was put in comes out again.
 
 use super::{at_rest, curve};
 use strapd_attitude::noise::allan::{AllanFit, MAX_MISFIT, fit};
@@ -21,7 +21,7 @@ fn fits(text: &str, interval_nanos: i64, n: usize, seed: u64) -> Vec<AllanFit> {
         .collect()
 }
 
-/// Of one coefficient over seeds and axes: rms relative error, worst, rms of error over stated error, and
+/// Recovery of one coefficient over seeds and axes: rms relative error, worst, rms of error over stated error, and
 /// how often it was not seen.
 #[derive(Debug, Default)]
 struct Recovered {

@@ -54,7 +54,7 @@ fn lost_samples_of_a_coarse_clock_leave_a_gap_and_move_nothing_else() {
     }
 }
 
-/// Which sample it is: `sample(n)` writes n into the rate about x.
+/// Index of a sample: `sample(n)` writes n into the rate about x.
 fn index_of(raw: &RawSample) -> i64 {
     (raw.gyro.unwrap()[0] / sample(1).gyro.unwrap()[0]).round() as i64
 }

@@ -1,4 +1,4 @@
-//! What `info` prints, from streams whose properties are known.
+//! Figures that `info` prints, from streams whose properties are known.
 
 use super::{STEP, T0, at, sample};
 use strapd_attitude::condition::Clock;

@@ -50,7 +50,7 @@ fn error(estimate: &Quaternion<Nav, Body>, truth: &Quaternion<Nav, Body>) -> Vec
     (estimate.inverse() * *truth).rotation_vector().0
 }
 
-/// What one gyro says in each of `steps` steps (delta angles, noise and all), the true attitude at the end
+/// Readings of one gyro in each of `steps` steps (delta angles, noise and all), the true attitude at the end
 /// and the true bias there, when the true initial attitude is none.
 struct Flight {
     initial: Quaternion<Nav, Body>,
@@ -104,7 +104,7 @@ fn normalised_6(seed: u64, steps: usize, noise: &Noise) -> f64 {
     x.dot(&p.solve(&x))
 }
 
-/// What the propagator makes of it, through its own door.
+/// Attitudes that the propagator makes of it, through its own door.
 fn propagated(flight: &Flight, method: Method, noise: &Noise) -> Vec<AttitudeSample> {
     let step = (STEP * 1e9) as i64;
     let mut propagator = Propagator::new(Settings {
@@ -235,7 +235,7 @@ fn with_known_white_noise_the_errors_lie_within_three_sigma() {
     assert!((0.95..0.99999).contains(&part), "{part}");
 }
 
-/// Of 400 gyros, each with errors of scale and axes of its own, on a body that tumbles for 15 s.
+/// Checks 400 gyros, each with errors of scale and axes of its own, on a body that tumbles for 15 s.
 #[test]
 fn errors_of_scale_and_axes_have_the_covariance_that_is_reported() {
     let noise = Noise {

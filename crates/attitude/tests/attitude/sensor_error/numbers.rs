@@ -9,7 +9,7 @@ use strapd_attitude::record::SampleKind::{self, Average, DeltaAngle, Rate};
 const ALL: &str = "arw=0.3,bias-instability=20,rrw=60,rate-ramp=100,gm-sigma=10,gm-tau=3,turn-on-bias=50,\
 temperature-coefficient=5,scale-ppm=2000,misalignment=0.5,nonlinearity-ppm=300,nonlinearity3-ppm=200,\
 g-sensitivity=30,range=200,bandwidth-hz=60,quantization=0.5,accel-noise=100,accel-bias=3";
-/// What else constant errors have.
+/// Further constant errors.
 const MORE: &str = "accel-scale-ppm=4000,accel-misalignment=0.3";
 
 /// FNV-1a of the bits of all readings.

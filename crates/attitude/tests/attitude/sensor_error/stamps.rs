@@ -1,4 +1,4 @@
-//! When samples are taken, what their stamps say, which are lost.
+//! Instants at which samples are taken, their stamps, and which are lost.
 
 use strapd_attitude::noise::sensor_error::{StampError, StampModel, Tick};
 use strapd_attitude::record::Nanos;

@@ -88,7 +88,7 @@ fn check(
     }
 }
 
-/// Where a sample begins: a rate at its stamp, an increment a step before it, but for the first.
+/// Start of a sample: a rate at its stamp, an increment a step before it, but for the first.
 fn begin(kind: SampleKind, is_first: bool, stamp: i64, step: i64) -> i64 {
     match kind {
         SampleKind::Rate => stamp,

@@ -1,4 +1,4 @@
-//! How fast errors fall with the sampling interval, method by method, on the top and on random smooth motion; and
+//! Order of convergence with the sampling interval, method by method, on the top and on random smooth motion; and
 //! the columns of the coning table (`docs/theory/attitude.md` 6.1) that one sampling rate and ten degrees do not show.
 
 use super::coning::Coning;
@@ -8,7 +8,7 @@ use strapd_attitude::propagate::{Method, Order};
 use strapd_attitude::record::{RateSample, SampleKind};
 use strapd_bodies::motion::BandLimited;
 
-/// What is expected of a method, and the sampling rates on the top between which it shows: slow enough that the
+/// Order expected of a method, and the sampling rates on the top between which it shows: slow enough that the
 /// error is above rounding, fast enough that the next term of it is small.
 const ORDERS: [(Method, SampleKind, f64, usize); 17] = {
     const RATE: SampleKind = SampleKind::Rate;

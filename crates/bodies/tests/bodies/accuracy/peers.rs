@@ -29,7 +29,7 @@ fn worst(peer: Peer, samples: &[RateSample], truth: &[[f64; 4]], margin: usize) 
         .fold(0.0, f64::max)
 }
 
-/// In arc seconds, over a minute of coning at 100 Hz.
+/// Error in arc seconds, over a minute of coning at 100 Hz.
 fn on_cone(peer: Peer, kind: SampleKind, degrees: f64, cone: i64, sampling: i64) -> f64 {
     let cone = Coning {
         a: degrees.to_radians(),
@@ -52,7 +52,7 @@ fn cone_rate(cone: &Coning, k: i64) -> [f64; 3] {
     cone.rate(k).map(|w| w * 100.0 / cone.sampling as f64)
 }
 
-/// In degrees, over 1.2 s of the published top.
+/// Error in degrees, over 1.2 s of the published top.
 fn on_top(peer: Peer, kind: SampleKind, rate: usize) -> f64 {
     let (top, skip) = (seed_top(), FINE / rate);
     let step = (1_000_000_000 / rate) as i64;
@@ -80,7 +80,8 @@ fn on_top(peer: Peer, kind: SampleKind, rate: usize) -> f64 {
 const NONE: f64 = f64::NAN;
 
 /// A peer, what it reads, and the tables' figures: 10 degrees with cone over sampling frequency .001, .01, .03,
-/// 1 degree with .01, .1, .2 (`docs/theory/attitude.md` 6.1, arcsec); the top at 500, 1000, 2000, 4000 Hz (6.2, degrees).
+/// 1 degree with .01, .1, .2 (`docs/theory/attitude.md` 6.1, arcsec); the top at 500, 1000, 2000, 4000 Hz (6.2,
+/// degrees).
 type Row = (&'static str, Peer, SampleKind, [f64; 6], [f64; 4]);
 
 const ROWS: [Row; 8] = {

@@ -1,5 +1,5 @@
-//! Bursts cut out of recordings nobody here made. The bridge was tuned on BROAD 01, 03, 05, 09, 11, 15, the minute of 07,
-//! Husky and x-IMU3; what is held here, and stands in docs/accuracy.md, is of the others.
+//! Bursts cut out of recordings nobody here made. The bridge was tuned on BROAD 01, 03, 05, 09, 11, 15, the minute of
+//! 07, Husky and x-IMU3; what is held here, and stands in docs/accuracy.md, is of the others.
 
 use super::bursts::{Bridged, undamaged};
 use super::commit;
@@ -50,7 +50,7 @@ fn rates(name: &str) -> Option<Vec<(i64, [f64; 3])>> {
     Some(samples)
 }
 
-/// As samples of a kind, and which of them follow the one before by an ordinary step.
+/// Samples of a kind, and which of them follow the one before by an ordinary step.
 fn as_kind(rates: &[(i64, [f64; 3])], kind: SampleKind) -> (Vec<RateSample>, Vec<bool>) {
     let mut steps: Vec<i64> = rates.windows(2).map(|p| p[1].0 - p[0].0).collect();
     steps.sort_unstable();

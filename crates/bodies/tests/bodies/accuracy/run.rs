@@ -45,7 +45,7 @@ pub fn propagate(
     attitudes(propagator(method, kind, initial), samples)
 }
 
-/// What a propagator makes of all samples of a run.
+/// Attitudes that a propagator makes of all samples of a run.
 pub fn attitudes(mut propagator: Propagator, samples: &[RateSample]) -> Vec<AttitudeSample> {
     let mut out = Vec::new();
     propagator.push(samples, &Sequential, &mut out);

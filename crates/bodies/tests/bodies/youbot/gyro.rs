@@ -11,7 +11,7 @@ use strapd_attitude::record::{Join, Measured, Nanos, RateSample, SampleKind, Sta
 use strapd_bodies::dh::Transform;
 use strapd_bodies::youbot::*;
 
-/// On a bracket: turned about three axes, 5 cm out.
+/// Mount on a bracket: turned about three axes, 5 cm out.
 fn bracket() -> ImuMount {
     let q = Quaternion::<Tool, Sensor>::assume_unit([0.5, -0.5, 0.1, 0.7]).normalised();
     ImuMount::new(Transform::new(

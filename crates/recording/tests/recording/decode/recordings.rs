@@ -56,7 +56,7 @@ type Topic = (Vec<RawSample>, usize, Decoded);
 /// Topic, samples, undecodable payloads.
 type Expected = [(&'static str, usize, usize)];
 
-/// What each topic of a recording decodes to.
+/// Results of decoding each topic of a recording.
 fn all(relative: &str) -> Option<BTreeMap<String, Topic>> {
     let mut decoders: BTreeMap<String, Option<Decoder>> = BTreeMap::new();
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();

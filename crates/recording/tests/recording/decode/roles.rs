@@ -1,4 +1,4 @@
-//! Which channels are taken for an IMU, and which never are.
+//! Channels that are taken for an IMU, and those that never are.
 
 use super::channel;
 use strapd_recording::decode::{Channel, Rank, Role, role};

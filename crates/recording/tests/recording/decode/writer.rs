@@ -5,7 +5,7 @@
 pub(crate) struct Writer {
     pub(crate) bytes: Vec<u8>,
     big: bool,
-    /// Where alignment counts from; `None`: nothing is aligned (ROS 1).
+    /// Origin of alignment; `None`: nothing is aligned (ROS 1).
     origin: Option<usize>,
 }
 

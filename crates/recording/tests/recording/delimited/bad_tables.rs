@@ -1,4 +1,4 @@
-//! What nobody well-meaning, and many a well-meaning program, writes: a clear error or a counted row each.
+//! Tables that nobody well-meaning, and many a well-meaning program, writes: a clear error or a counted row each.
 
 use super::{Dribble, Given, all, options, read};
 use std::io::Read;
@@ -250,7 +250,7 @@ fn what_is_no_table_of_text_is_called_so() {
     }
 }
 
-/// As many bytes, none of them kept.
+/// Reader of as many bytes, none of them kept.
 struct Long(u64, u8);
 
 impl Read for Long {

@@ -16,7 +16,7 @@ pub fn quaternion(k: usize) -> [f64; 4] {
     [(angle / 2.0).cos(), x, y, z]
 }
 
-/// Its vector, by our own logarithm: `a_turn_is_its_rotation_vector` holds that against the one it was made of.
+/// Rotation vector by our own logarithm: `a_turn_is_its_rotation_vector` holds it against the one it was made of.
 pub fn turned(k: usize) -> [f64; 3] {
     let turn = Quaternion::<Sensor, Sensor>::try_from_wxyz(quaternion(k)).unwrap();
     turn.rotation_vector().0.into()
