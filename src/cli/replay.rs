@@ -124,7 +124,7 @@ pub enum CompressionArg {
     Zstd,
     /// lz4.
     Lz4,
-    /// No compression.
+    /// Uncompressed.
     None,
 }
 

@@ -110,7 +110,7 @@ enum Asked {
     For,
     /// Built, and waiting.
     Made(Bytes),
-    /// Taken, and not left yet.
+    /// Built and taken, and not left yet.
     Taken,
 }
 

@@ -39,7 +39,7 @@ fn propagate(c: &mut Criterion) {
     group.finish();
 }
 
-/// In each round every method once, one after another: a slow moment hits neighbours alike. Pieces short enough to
+/// Runs every method once in each round, one after another: a slow moment hits neighbours alike. Pieces short enough to
 /// fit between two interruptions; the least time of all rounds, and the median of the rounds' ratios.
 fn ratios(_: &mut Criterion) {
     const ROUNDS: usize = 101;

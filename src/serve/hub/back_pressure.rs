@@ -125,7 +125,7 @@ enum Waited {
     Nobody,
     /// Room.
     Room,
-    /// No room yet.
+    /// Still full.
     InVain,
 }
 

@@ -13,7 +13,7 @@ const CROWDED: usize = MAX_QUEUED / 2;
 /// State of the lease: which sensors are ours, and until when.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tenure {
-    /// No lease needed.
+    /// Free: a lease is not needed.
     #[default]
     Free,
     /// Others may have them.

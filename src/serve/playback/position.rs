@@ -10,7 +10,7 @@ pub enum Mode {
     Playing,
     /// Waiting for a client.
     Paused,
-    /// At its end.
+    /// Ended.
     Ended,
 }
 

@@ -17,7 +17,7 @@ const STORMERS: usize = 100;
 const EACH: usize = 40_000;
 /// Time for which nobody may be kept waiting: a fifth of a second, ten times over for the load beside.
 const LATE: Duration = Duration::from_secs(2);
-/// Time it took before who asks for much was made to wait: 19.6 s; the bound is below.
+/// Bound on the time of an answer; it was 19.6 s before who asks for much was made to wait.
 const FROZEN: Duration = Duration::from_secs(8);
 
 /// A daemon with a thousand sensors, and who sends them.

@@ -1,4 +1,4 @@
-//! What is timed and counted: methods and logs.
+//! Cases that are timed and counted: methods and logs.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

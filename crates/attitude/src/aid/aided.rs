@@ -77,7 +77,7 @@ pub struct Aided {
     /// Specific forces that do not come with the gyro samples.
     pub(super) forces: Option<Beside>,
     pub(super) fields: Beside,
-    /// Given to the propagator, whose attitudes have not come out yet.
+    /// Samples given to the propagator, whose attitudes have not come out yet.
     pub(super) given: VecDeque<Given>,
     pub(super) last: Option<Nanos>,
     /// Samples that go into the propagator at once, and what comes out of it.

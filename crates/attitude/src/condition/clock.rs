@@ -17,7 +17,7 @@ pub enum Clock {
     Log,
     /// Time at which the publisher sent it.
     Publish,
-    /// No clock: the n-th sample is n periods after the first one's log time.
+    /// Counter: the n-th sample is n periods after the first one's log time.
     Index {
         /// Samples per second.
         rate_hz: f64,

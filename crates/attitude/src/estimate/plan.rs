@@ -345,7 +345,7 @@ pub enum Initial {
     Gravity,
     /// The first recorded orientation.
     FirstOrientation,
-    /// Given, in the convention of [`Plan::world`].
+    /// Attitude as given, in the convention of [`Plan::world`].
     Given(Quaternion<Nav, Body>),
 }
 
@@ -356,7 +356,7 @@ pub enum Bias {
     None,
     /// Estimate from detected rest; refused when there is none.
     Auto,
-    /// Given.
+    /// Bias as given.
     Given(BodyRate),
 }
 

@@ -214,7 +214,7 @@ struct InOrder<const W: usize, F> {
     /// First segment of the next one.
     next: usize,
     early: BTreeMap<usize, Job<W>>,
-    /// Taken, to be filled again.
+    /// Memory that was taken, to be filled again.
     spare: Vec<Job<W>>,
 }
 
