@@ -84,3 +84,24 @@ fn a_sensor_that_has_ended_is_shown_as_it_was_last_and_one_without_an_attitude_w
     );
     browser.is_unharmed();
 }
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_stream_of_which_nothing_is_used_is_shown_with_what_helps() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let shown = "document.querySelector('[data-testid=refused]')";
+    assert_eq!(browser.eval(&format!("{shown}.hidden")), true);
+    let mut sender = Client::tcp(daemon.address(0));
+    for _ in 0..200 {
+        sender.send("{\"id\":\"mute\",\"gyro\":[0.1,0,0]}");
+    }
+    browser.until(
+        "the loss on the page",
+        &format!(
+            "!{shown}.hidden && /^mute: 200 samples not used, first at line 1, .*--time log/.test({shown}.textContent)"
+        ),
+    );
+}
