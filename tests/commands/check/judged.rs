@@ -8,6 +8,7 @@ use strapd_attitude::record::Verdict;
 
 const FIRST: i64 = 1_700_000_000_000_000_000;
 const STEP: i64 = 10_000_000;
+const FAULTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/faults.mcap");
 
 /// Rows of a gyro at 100 Hz.
 fn rows(n: i64) -> Vec<String> {
@@ -30,7 +31,7 @@ fn giving(verdict: Verdict) -> (Vec<String>, &'static str) {
         Verdict::Accepted => {}
         Verdict::Reordered => rows.swap(100, 101),
         Verdict::Undecodable => rows[100] = "no,number,at,all".to_owned(),
-        Verdict::NoGyro => rows[100] = String::new(),
+        Verdict::NoGyro => {}
         Verdict::NotFinite => rows[100] = at(100, "nan"),
         Verdict::Huge => rows[100] = at(100, "100001"),
         Verdict::Repeated => rows.insert(100, rows[100].clone()),
@@ -51,23 +52,6 @@ fn giving(verdict: Verdict) -> (Vec<String>, &'static str) {
 
 fn table(rows: &[String]) -> String {
     format!("stamp_ns,gyro_x,gyro_y,gyro_z\n{}\n", rows.join("\n"))
-}
-
-/// The same as lines, of which one has no rate.
-fn lines(rows: &[String]) -> String {
-    let mut out = String::new();
-    for (i, row) in rows.iter().enumerate() {
-        let cells: Vec<&str> = row.split(',').collect();
-        let _ = match cells.as_slice() {
-            [stamp, x, y, z] => writeln!(out, "{{\"stamp_ns\":{stamp},\"gyro\":[{x},{y},{z}]}}"),
-            _ => writeln!(
-                out,
-                "{{\"stamp_ns\":{},\"gyro\":null}}",
-                FIRST + i as i64 * STEP
-            ),
-        };
-    }
-    out
 }
 
 fn json(ran: &Ran) -> Value {
@@ -96,11 +80,12 @@ fn every_verdict_of_a_replay_has_its_finding() {
             continue;
         }
         let (rows, flags) = giving(verdict);
-        let (name, text) = match verdict {
-            Verdict::NoGyro => ("log.ndjson", lines(&rows)),
-            _ => ("log.csv", table(&rows)),
+        // Rows have no mark for a gyro that is absent.
+        let name = match verdict {
+            Verdict::NoGyro => FAULTS,
+            _ => "log.csv",
         };
-        std::fs::write(dir.path().join(name), text).unwrap();
+        std::fs::write(dir.path().join("log.csv"), table(&rows)).unwrap();
         let ran = strapd(
             dir.path(),
             &format!("replay {name} {flags} --json -o null:"),
@@ -305,7 +290,7 @@ fn check_judges_the_attitude_of_replay_with_its_flags() {
         .collect();
     std::fs::write(dir.path().join("tenfold.csv"), tenfold).unwrap();
     let ran = strapd(dir.path(), "replay tenfold.csv --aid auto -o null:");
-    assert!(ran.out.contains("10.00 times as long"), "{ran:?}");
+    assert!(ran.out.contains("10.0 times as long"), "{ran:?}");
     assert!(!ran.out.contains("without gravity"), "{ran:?}");
     let (all, exit) = found(dir.path(), "tenfold.csv", "--aid auto");
     assert!(all.iter().any(|f| f.1 == "force-implausible"), "{all:?}");
@@ -349,6 +334,20 @@ fn all_topics_of_a_pipe_are_taken() {
         let bytes = std::fs::read(&path).unwrap();
         let from_pipe = strapd_fed(dir.path(), &format!("replay - {flags}"), bytes);
         assert_eq!(from_file.code, from_pipe.code, "{name}: {from_pipe:?}");
+        if from_file.code == Some(1) {
+            let why = |ran: &Ran| {
+                ran.err
+                    .split_once(": ")
+                    .unwrap()
+                    .1
+                    .split_once(": ")
+                    .unwrap()
+                    .1
+                    .to_owned()
+            };
+            assert_eq!(why(&from_file), why(&from_pipe), "{name}");
+            continue;
+        }
         let names = |ran: &Ran| -> Vec<Value> {
             let topics = json(ran)["topics"].as_array().unwrap().clone();
             topics.iter().map(|topic| topic["topic"].clone()).collect()
