@@ -87,4 +87,4 @@ def test_a_finished_estimator_is_closed() -> None:
 
 def test_a_live_sensor_can_not_be_smoothed() -> None:
     with pytest.raises(ValueError, match=r"smooth: only a whole recording can be smoothed(.|\n)*estimate"):
-        strapd.Estimator(smooth=True)
+        strapd.Estimator(smooth=True, method="auto")

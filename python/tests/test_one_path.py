@@ -194,7 +194,8 @@ def test_recordings_of_other_makers_are_on_the_one_path() -> None:
                 replayed = run(strapd.replay, path, topic=topic, **settings)
                 clock = "header" if isinstance(replayed, str) else replayed[0].summary["clock"]
                 read = samples(path, topic, clock)
-                if read.acc is not None and read.acc_t is read.t:
+                # The unit of a single force, which nothing confirms, is known from its message alone.
+                if read.acc is not None and read.acc_t is read.t and len(read) > 1:
                     same(run(strapd.estimate, read.gyr, read.acc, t=read.t, dt=read.dt, **{"kind": read.kind, **settings}), replayed)
                     held += 1
     assert held >= 10

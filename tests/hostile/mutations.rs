@@ -210,3 +210,24 @@ fn a_bug_would_be_found() {
     });
     assert!(found.is_err());
 }
+
+/// And work that does not end in time, by what it uses; what only waits is not it.
+#[cfg(target_os = "linux")]
+#[test]
+fn work_without_end_would_be_found() {
+    let limit = Duration::from_millis(200);
+    let mut meter = Meter::start();
+    std::thread::sleep(2 * limit);
+    assert!(meter.lap(limit, "a wait") >= 2 * limit);
+    let used = crate::meter::spent().unwrap();
+    // The second before is never held against it.
+    while crate::meter::spent().unwrap() - used < Duration::from_millis(1400) {
+        std::hint::black_box((0..10_000).sum::<u64>());
+    }
+    let found = catch_unwind(AssertUnwindSafe(|| meter.lap(limit, "a loop"))).unwrap_err();
+    let said = found.downcast_ref::<String>().unwrap();
+    assert!(
+        said.starts_with("a loop: used 1.") && said.ends_with("CPU of 200ms"),
+        "{said}"
+    );
+}

@@ -45,7 +45,9 @@ impl Meter {
         let elapsed = self.lap.elapsed();
         // What took less by the clock has used less.
         if elapsed > limit {
-            let used = spent().zip(self.spent).map(|(now, then)| now - then);
+            let used = spent()
+                .zip(self.spent)
+                .map(|(now, then)| now.saturating_sub(then));
             // A second of those before it is in it, at most.
             let most = limit + OFTEN;
             if let Some(used) = used {

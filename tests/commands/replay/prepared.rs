@@ -25,7 +25,7 @@ fn a_table_and_lines_are_prepared_as_the_log_of_the_same_samples() {
     ] {
         let attitudes = ["mcap", "csv", "ndjson"].map(|form| {
             let run = format!("replay log.{form} {flags} -o out.csv --force");
-            let said = strapd(at, &run).done().err.clone();
+            let said = strapd(at, &run).done().out.clone();
             assert!(said.contains("the driver cut the rates"), "{run}: {said}");
             std::fs::read_to_string(at.join("out.csv")).unwrap()
         });
