@@ -20,7 +20,7 @@ const SPARE: usize = 64;
 const SPARE_BYTES: usize = 4 << 20;
 
 /// Weight of all items that may wait for their turn; a block of more is given back, and done when its turn has come.
-const MOST_WAITING: usize = 16 << 20;
+const MOST_WAITING: usize = 4 << 20;
 
 /// What one worker needs and the next can use again.
 #[derive(Debug, Default)]
