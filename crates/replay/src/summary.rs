@@ -427,12 +427,8 @@ impl TopicSummary {
                 ),
             );
         }
-        let resets = self.recorded.map_or(0, |recorded| recorded.resets);
-        if let Some(words) = against::resets(resets) {
+        for words in self.recorded.iter().flat_map(Recorded::words) {
             line(out, "", &words);
-        }
-        if let Some(found) = self.recorded.and_then(|r| r.consistency) {
-            line(out, "", &against::within_sigma(&found));
         }
     }
 

@@ -124,6 +124,12 @@ pub fn bias_json(fit: &BiasFit) -> Value {
 }
 
 impl Recorded {
+    /// Lines for people: its resets, and the share of the errors within sigma.
+    pub(super) fn words(&self) -> impl Iterator<Item = String> {
+        let sigma = self.consistency.as_ref().map(within_sigma);
+        resets(self.resets).into_iter().chain(sigma)
+    }
+
     /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
