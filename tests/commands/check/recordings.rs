@@ -50,7 +50,10 @@ const FINDINGS: [(&str, &[&str]); 24] = [
         &["missing", "sample-kind", "undecodable"],
     ),
     ("hostile/25_header_only", &["no-imu-topic"]),
-    ("hostile/mcap-0.25.0-hang", &["file-damaged", "undecodable"]),
+    (
+        "hostile/mcap-0.25.0-hang",
+        &["file-damaged", "nothing-used", "undecodable"],
+    ),
     ("hostile/01_no_summary", &["sample-kind"]),
 ];
 
