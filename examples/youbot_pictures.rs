@@ -3,7 +3,7 @@
 //! - `youbot-workspace.svg`: where the tool point can be, from the side, and three poses of the arm;
 //! - `youbot-path.svg`: joints of the simulator's own motion.
 
-// An example stops with the reason when it can not draw.
+// An example stops with the reason when it cannot draw.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::Path;

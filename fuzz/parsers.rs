@@ -302,7 +302,7 @@ fn packed_object(object: &[u8]) {
             let mut again = Vec::new();
             packed::push_sample(&mut again, stream, seq.unwrap_or(packed::NO_SEQ), &sample);
             let Ok(Object::Rate { sample: other, .. }) = packed::read(&again, NOW) else {
-                panic!("what was written can not be read");
+                panic!("what was written cannot be read");
             };
             // A line has neither: what is infinite is no data there, and no stamp is when it was logged.
             let finite = |v: &[f64; 3]| v.iter().all(|c| c.is_finite());

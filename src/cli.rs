@@ -170,7 +170,7 @@ pub enum Command {
     /// Topics, rates, clocks and frames of a log, and what to do next
     Info(info::Info),
     /// Everything that may spoil the attitude from a log, with the flag that helps
-    Check(check::Check),
+    Check(Box<check::Check>),
     /// One self-contained HTML page about a log: quality, attitude, errors, noise
     Report(Box<report::Report>),
     /// Time-aligned angle error between two attitudes

@@ -20,7 +20,7 @@ pub mod watcher;
 
 use crate::error::{Error, Result};
 
-/// Runs the work of a command that talks to a daemon, `name` in what is said when it can not even begin.
+/// Runs the work of a command that talks to a daemon, `name` in what is said when it cannot even begin.
 /// What it leaves behind is not waited for.
 ///
 /// # Errors

@@ -33,6 +33,6 @@ def replayed(log, folder, again=False, **flags):
         parquet.write_table(att.to_arrow(), partial, compression="zstd")
         os.replace(partial, out)
     except strapd.Error as why:
-        # One log that can not be read is no reason to leave the others.
+        # One log that cannot be read is no reason to leave the others.
         return str(log), 0, None, str(why)
     return str(log), len(att), att.lost, ""

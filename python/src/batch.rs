@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use strapd_attitude::estimate::Aid;
 use strapd_replay::pipeline::samples::{Stop, estimate as run};
 
-/// How long Ctrl-C waits at most, beside the samples between two looks.
+/// Longest wait for Ctrl-C, beside the samples between two looks.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Asks Python for signals, ten times a second.
@@ -39,7 +39,8 @@ impl Signals {
     }
 }
 
-/// Attitudes, the summary as JSON, its warnings, the sigma of the bias that was removed beforehand, and the calibration.
+/// Attitudes, the summary as JSON, its warnings, the sigma of the bias that was removed beforehand, and the
+/// calibration.
 type Estimated<'py> = (
     Bound<'py, PyDict>,
     String,

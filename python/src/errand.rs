@@ -2,7 +2,7 @@
 //!
 //! Apart from the work because readers of recordings know nothing of Python: whoever waits for one may press Ctrl-C
 //! at any time,
-//! also where the work can not be asked. Then it is told to end, waited for a moment, and left to end by itself.
+//! also where the work cannot be asked. Then it is told to end, waited for a moment, and left to end by itself.
 
 use crate::refusal;
 use pyo3::prelude::*;

@@ -1,4 +1,4 @@
-//! What is known of a live estimator -> a dict, under the names of `strapd replay --json`. Pure but for Python's objects.
+//! State of a live estimator -> a dict, under the names of `strapd replay --json`. Pure but for Python's objects.
 //!
 //! Apart from the summary of a replay because it is asked for with every few samples.
 

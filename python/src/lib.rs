@@ -1,7 +1,8 @@
 //! numpy arrays -> attitudes as numpy arrays: the compiled half of the Python package `strapd`.
 //!
 //! What a user sees is written in Python (`python/strapd`); here is what has to be fast. Everything is computed by
-//! `strapd-attitude` and read by `strapd-replay`, the path of the command `strapd replay`, so that both give the same bits.
+//! `strapd-attitude` and read by `strapd-replay`, the path of the command `strapd replay`, so that both give the same
+//! bits.
 //!
 //! | module | arrow |
 //! |---|---|

@@ -4,12 +4,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// An argument that can not be: `ValueError`, which names it.
+/// An argument that cannot be: `ValueError`, which names it.
 pub fn argument(what: impl Into<Diagnostic>) -> PyErr {
     PyValueError::new_err(in_python(&what.into().to_string()))
 }
 
-/// A run that can not be carried out: `strapd.Error` of this kind.
+/// A run that cannot be carried out: `strapd.Error` of this kind.
 pub fn run(py: Python<'_>, kind: &str, what: impl Into<Diagnostic>) -> PyErr {
     raised(py, kind, &what.into(), in_python)
 }

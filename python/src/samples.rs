@@ -76,7 +76,7 @@ impl<'a> Samples<'a> {
         self.gyr.len()
     }
 
-    /// Those of a range, in order.
+    /// Samples of a range, in order.
     pub fn part(self, from: usize, to: usize) -> impl Iterator<Item = RawSample> + Clone {
         (from..to.min(self.len())).filter_map(move |i| self.get(i))
     }

@@ -90,7 +90,7 @@ impl Words {
     /// The replay of the log at `path`.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the argument; the calibration can not be read.
+    /// [`Error::Usage`] naming the argument; the calibration cannot be read.
     pub fn request(
         &self,
         path: PathBuf,

@@ -57,7 +57,7 @@ def test_arrays_give_the_bits_of_a_replay(
     for name in strapd.STATUS_BITS:
         theirs = np.array([name in status for status in said.status])
         if path.name == "faults.mcap" and name == "rejected-before":
-            # A message that can not be decoded is no row of an array.
+            # A message that cannot be decoded is no row of an array.
             assert not (found.flags(name) & ~theirs).any()
             continue
         assert (found.flags(name) == theirs).all(), name

@@ -1,4 +1,4 @@
-"""An argument that can not be is a ValueError that names it; what can be taken without a copy is."""
+"""An argument that cannot be is a ValueError that names it; what can be taken without a copy is."""
 
 from __future__ import annotations
 

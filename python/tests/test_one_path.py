@@ -73,7 +73,7 @@ def same(ours: Run, theirs: Run) -> None:
     (att, said), (replayed, their_words) = ours, theirs
     for name in ("t", "q", "rate", "_cov", "bias"):
         same_bits(getattr(att, name), getattr(replayed, name))
-    # A message that can not be decoded is no row of an array.
+    # A message that cannot be decoded is no row of an array.
     seen = ~np.uint16(strapd.STATUS_BITS["rejected-before"])
     assert (att.reset == replayed.reset).all() and (att.status & seen == replayed.status & seen).all()
     assert att.smoothing == replayed.smoothing and said == their_words

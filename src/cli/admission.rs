@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Most clients that can be asked for.
 const MAX_CLIENTS: u64 = 100_000;
 
-/// Who may connect.
+/// Clients that may connect.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Admission")]
 pub struct Admission {
@@ -36,7 +36,7 @@ impl Admission {
     /// Applies them to these settings.
     ///
     /// # Errors
-    /// The token file can not be read, or holds none.
+    /// The token file cannot be read, or holds none.
     pub(super) fn apply(&self, settings: Settings) -> Result<Settings> {
         Ok(Settings {
             token: self.token_file.as_deref().map(Token::read).transpose()?,

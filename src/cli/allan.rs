@@ -101,7 +101,7 @@ struct Axis {
 /// Runs it.
 ///
 /// # Errors
-/// The log can not be read, holds no rate, or too few samples; an output exists.
+/// The log cannot be read, holds no rate, or too few samples; an output exists.
 pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     let plan = args.plan()?;
     let mut selection = selection(

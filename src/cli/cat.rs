@@ -85,7 +85,7 @@ pub enum Format {
 /// Runs it.
 ///
 /// # Errors
-/// The log can not be read or decoded; stdout can not be written.
+/// The log cannot be read or decoded; stdout cannot be written.
 pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     match args.source.to_str() {
         Some(text) if Remote::is_meant(text) && elsewhere::meant(text).is_none() => {

@@ -33,7 +33,7 @@ pub struct Check {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
-    /// How a table is to be read.
+    /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
 }
@@ -41,7 +41,7 @@ pub struct Check {
 /// Runs it.
 ///
 /// # Errors
-/// The log can not be read, or the topic named is not in it.
+/// The log cannot be read, or the topic named is not in it.
 pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
     let mut selection = args.estimation.selection()?;
@@ -91,7 +91,7 @@ fn one(
     Ok((text, outcome))
 }
 
-/// As a program in Python has it, which sets nothing that could deal with a finding.
+/// JSON as a program in Python has it, which sets nothing that could deal with a finding.
 fn in_json(told: &Told) -> serde_json::Value {
     match told.answered {
         Some(_) => told.json(),

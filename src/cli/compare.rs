@@ -68,7 +68,7 @@ pub struct Compare {
 /// Runs it.
 ///
 /// # Errors
-/// A file can not be read, holds no attitude or several, or the two share no instant.
+/// A file cannot be read, holds no attitude or several, or the two share no instant.
 pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let align: Align = args.align.parse().map_err(|e| {
         Error::usage(Diagnostic::from(&e).at(format_args!("--align {}", args.align)))
@@ -191,7 +191,7 @@ impl Told {
             })
             .collect();
         let axes = fit_body_axes(estimated, referred.rows);
-        // About one axis alone a bias and other axes can not be told apart.
+        // About one axis alone a bias and other axes cannot be told apart.
         let is_bias = |fit: &BiasFit| {
             fit.is_worth_removing()
                 && axes.is_some_and(|axes| {

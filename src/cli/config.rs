@@ -65,7 +65,7 @@ pub struct Layered {
 /// Runs it.
 ///
 /// # Errors
-/// The file can not be read, or does not fit.
+/// The file cannot be read, or does not fit.
 pub fn run(args: &Config) -> Result<Outcome> {
     let argv = |file: &Path| {
         ["strapd", "serve", "--config"]

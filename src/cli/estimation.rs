@@ -349,7 +349,7 @@ impl Estimation {
     /// The flags as one checked plan.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the flag, for anything that can be judged without the data; the calibration can not
+    /// [`Error::Usage`] naming the flag, for anything that can be judged without the data; the calibration cannot
     /// be read.
     pub fn plan(&self) -> Result<Plan> {
         let known = match &self.calibration {

@@ -40,7 +40,7 @@ pub struct Info {
 /// Runs it.
 ///
 /// # Errors
-/// The log can not be read, or the topic named is not in it.
+/// The log cannot be read, or the topic named is not in it.
 pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
     let mut options = Options {

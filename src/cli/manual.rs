@@ -29,7 +29,7 @@ pub struct Man {
 /// Prints the completions.
 ///
 /// # Errors
-/// Stdout can not be written.
+/// Stdout cannot be written.
 pub fn completions(command: &Completions) -> Result<Outcome> {
     let mut script = Vec::new();
     clap_complete::generate(command.shell, &mut Cli::command(), "strapd", &mut script);
@@ -40,7 +40,7 @@ pub fn completions(command: &Completions) -> Result<Outcome> {
 /// Prints or writes the manual.
 ///
 /// # Errors
-/// Stdout or the directory can not be written.
+/// Stdout or the directory cannot be written.
 pub fn man(command: &Man) -> Result<Outcome> {
     if let Some(dir) = &command.out_dir {
         let written = std::fs::create_dir_all(dir)

@@ -17,7 +17,7 @@ use clap::{Args, Subcommand};
 #[derive(Args, Debug)]
 #[command(
     after_help = "Every request is a JSON object on one line; the answers come in order, one line each.
-What can not be answered becomes {\"error\": \"...\"} on its line, and the exit code is 3.
+What cannot be answered becomes {\"error\": \"...\"} on its line, and the exit code is 3.
 SI units and radians.
 
 Examples:
@@ -44,7 +44,7 @@ pub enum Which {
 /// Runs it.
 ///
 /// # Errors
-/// Standard input or output fails; flags that can not be.
+/// Standard input or output fails; flags that cannot be.
 pub fn run(global: &Global, args: &Model) -> Result<Outcome> {
     match &args.which {
         Which::Top(command) => top::run(global, command),

@@ -25,7 +25,7 @@ pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>
 /// plain name is not made, as it may be a slip of the hand.
 ///
 /// # Errors
-/// [`Error::Write`]: a folder can not be made.
+/// [`Error::Write`]: a folder cannot be made.
 pub fn make_folders(outputs: &[String], names: &[String]) -> Result<()> {
     let made = outputs
         .iter()

@@ -44,7 +44,7 @@ pub struct Recover {
 /// Runs it.
 ///
 /// # Errors
-/// The input can not be read or is no MCAP; the output can not be written.
+/// The input cannot be read or is no MCAP; the output cannot be written.
 pub fn run(global: &Global, args: &Recover) -> Result<Outcome> {
     let run = recover::Recover {
         source: Source::parse(&args.source),

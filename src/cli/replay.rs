@@ -316,7 +316,7 @@ impl Replay {
     /// The run for one log.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a flag that can not be.
+    /// [`Error::Usage`] for a flag that cannot be.
     fn run(
         &self,
         log: &str,

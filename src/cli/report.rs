@@ -70,7 +70,7 @@ pub struct Report {
 /// Runs it.
 ///
 /// # Errors
-/// A file can not be read, the page exists, or the topic named is not in the log. What is wrong with
+/// A file cannot be read, the page exists, or the topic named is not in the log. What is wrong with
 /// the samples is no error: the page says it.
 pub fn run(global: &Global, mut args: Report) -> Result<Outcome> {
     args.files = made_before::without(args.files, args.estimation.topic.as_deref())?;

@@ -92,7 +92,7 @@ struct Read {
 /// Runs it.
 ///
 /// # Errors
-/// The log can not be read or decoded; nobody answers, or whoever answered has gone.
+/// The log cannot be read or decoded; nobody answers, or whoever answered has gone.
 pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
     let remote = Remote::parse(&args.address)?;
     if matches!(remote, Remote::UdpListen(_)) {
@@ -112,7 +112,7 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
         .transpose()?;
     let mut options = selection(None, &args.fields, false, [None; 2])?.decode;
     args.tables.put(&mut options)?;
-    // Looked at before anybody is called: a log that can not be read is not the daemon's business.
+    // Looked at before anybody is called: a log that cannot be read is not the daemon's business.
     let pool = Pool::new(global.threads)?;
     let log = Recording::told_apart(
         &logged::open(&args.source)?,

@@ -154,7 +154,7 @@ fn sent_to(text: &str) -> Result<Target> {
 /// Runs it until a signal.
 ///
 /// # Errors
-/// An address can not be listened on, or the arguments can not be.
+/// An address cannot be listened on, or the arguments cannot be.
 pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     let layered = match &args.config {
         Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
@@ -409,7 +409,7 @@ impl Serve {
     /// The arguments, checked.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the flag; the token file can not be read.
+    /// [`Error::Usage`] naming the flag; the token file cannot be read.
     pub(crate) fn settings(&self) -> Result<Settings> {
         let given: Vec<&str> = if self.listen.is_empty() {
             DEFAULTS.to_vec()

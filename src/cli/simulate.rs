@@ -112,7 +112,7 @@ impl Simulate {
 /// Runs it.
 ///
 /// # Errors
-/// Flags that can not be; outputs that can not be written.
+/// Flags that cannot be; outputs that cannot be written.
 pub fn run(global: &Global, args: &Simulate) -> Result<Outcome> {
     let (name, common, made) = args.made()?;
     let on_stdout = common.outputs.iter().any(|o| o == "-");

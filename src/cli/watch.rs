@@ -65,7 +65,7 @@ pub struct Watch {
 /// Runs it.
 ///
 /// # Errors
-/// The address is none, the terminal can not be used, stdout can not be written.
+/// The address is none, the terminal cannot be used, stdout cannot be written.
 pub fn run(global: &Global, args: &Watch) -> Result<Outcome> {
     let remote = Remote::parse(&args.url)?;
     let token = args

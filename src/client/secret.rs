@@ -24,7 +24,7 @@ impl Secret {
     /// said of it.
     ///
     /// # Errors
-    /// It can not be read, others can read it, or it holds no token of 16 bytes.
+    /// It cannot be read, others can read it, or it holds no token of 16 bytes.
     pub fn read(flag: &str, path: &Path) -> Result<Secret> {
         Secret::no_shorter_than(MIN_TOKEN, flag, path)
     }
@@ -32,7 +32,7 @@ impl Secret {
     /// The same, where somebody else has chosen it.
     ///
     /// # Errors
-    /// It can not be read, others can read it, or it holds nothing.
+    /// It cannot be read, others can read it, or it holds nothing.
     #[cfg(any(feature = "nats", feature = "zenoh"))]
     pub fn of_others(flag: &str, path: &Path) -> Result<Secret> {
         Secret::no_shorter_than(1, flag, path)

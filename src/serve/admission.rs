@@ -39,7 +39,7 @@ impl Token {
     /// The first line of a file that nobody but its owner can read.
     ///
     /// # Errors
-    /// It can not be read, others can read it, or it holds no token of 16 bytes.
+    /// It cannot be read, others can read it, or it holds no token of 16 bytes.
     pub fn read(path: &Path) -> Result<Token> {
         Secret::read("--token-file", path).map(|secret| Token::new(secret.reveal()))
     }

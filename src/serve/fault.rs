@@ -17,7 +17,7 @@ impl Fault {
     /// Stamps are in another unit than their name says.
     pub(super) const STAMP_UNIT: &'static str = "stamp_unit";
 
-    /// Without a place.
+    /// Makes one without a place.
     #[must_use]
     pub fn new(code: &'static str, message: impl Into<String>) -> Fault {
         Fault {

@@ -1,7 +1,7 @@
 //! The hub -> somebody who listens: `serve -o tcp://`, `-o udp://`. I/O.
 //!
 //! A client like any other, but that we call: its outbox is bounded, the oldest give way, and it slows
-//! nobody down. One that can not be reached, or goes, is called again.
+//! nobody down. One that cannot be reached, or goes, is called again.
 
 use super::filter::Filter;
 use super::hub::{Client, ClientProtocol, Hub, count};

@@ -107,7 +107,7 @@ pub struct Hub {
     stamps_wait: AtomicBool,
     /// Streams of which nothing is used.
     pub(in crate::serve) losses: Losses,
-    /// What was counted.
+    /// Counters.
     pub counters: Counters,
 }
 
@@ -165,7 +165,7 @@ pub struct Feedback {
     pub note: Option<Fault>,
     /// Faults of what was not used, the first time.
     pub faults: Vec<Fault>,
-    /// None of the samples was used: why, and how many.
+    /// Fault and count where none of the samples was used.
     pub lost: Option<(Fault, u64)>,
 }
 

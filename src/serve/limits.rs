@@ -23,8 +23,8 @@ pub struct Limits {
     pub no_progress: Duration,
     /// Time for which a client that sends and watches nothing keeps its place when places are short.
     pub idle: Duration,
-    /// Between WebSocket pings (a client that answers none of two is closed), and how long nothing is sent to a watcher
-    /// that has ended its side before it is asked whether it is still there.
+    /// Time between WebSocket pings (a client that answers none of two is closed), and for which nothing is sent to a
+    /// watcher that has ended its side before it is asked whether it is still there.
     pub ping: Duration,
     /// Time for which a sensor sent by datagrams stays its sender's after the last.
     pub sender_silence: Duration,

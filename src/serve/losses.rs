@@ -1,4 +1,4 @@
-//! What senders lose whole -> one warning for each of them and each cause, again with a count after a minute, and
+//! Losses of senders -> one warning for each of them and each cause, again with a count after a minute, and
 //! `STATUS`. Pure but for the log and the clock.
 //!
 //! Apart from the answers to senders because a sensor seldom reads them: without this a stream of which nothing is
@@ -37,7 +37,7 @@ pub struct Lost<'a> {
     pub fault: &'a Fault,
     /// The first line's number, 0 where it has none, and its beginning.
     pub first: (u64, &'a [u8]),
-    /// How many.
+    /// Number of samples.
     pub count: u64,
     /// Nothing of this sender has been used so far.
     pub is_whole: bool,
@@ -47,13 +47,13 @@ pub struct Lost<'a> {
 #[derive(Debug, Default)]
 pub struct Losses {
     state: Mutex<State>,
-    /// How many are known: without one nobody waits for the lock.
+    /// Number of those known: without one nobody waits for the lock.
     known: AtomicUsize,
 }
 
 #[derive(Debug, Default)]
 struct State {
-    /// By source and code.
+    /// Losses by source and code.
     known: BTreeMap<(String, &'static str), Loss>,
     /// The minute in which lines are counted.
     minute: Option<Instant>,
@@ -75,7 +75,7 @@ struct Loss {
     told: Option<Told>,
 }
 
-/// When a loss was reported, of how many samples, and how often.
+/// Report of a loss: when, of how many samples, and how often.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     at: Instant,
@@ -115,14 +115,14 @@ impl Losses {
         self.known.store(state.known.len(), Ordering::Relaxed);
     }
 
-    /// To be called again and again: what is due is reported.
+    /// Reports what is due; to be called again and again.
     pub fn tick(&self) {
         if self.known.load(Ordering::Relaxed) > 0 {
             log(&self.tick_at(Instant::now()));
         }
     }
 
-    /// For `STATUS`: the last ones that were reported.
+    /// Last losses that were reported, for `STATUS`.
     pub fn status(&self) -> Vec<Value> {
         let state = self.lock();
         let now = Instant::now();
@@ -209,7 +209,7 @@ impl Loss {
         }
     }
 
-    /// In words.
+    /// Text for the log.
     fn words(&self, source: &str) -> String {
         let source = snippet(source.as_bytes());
         let message = &self.message;

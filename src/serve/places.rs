@@ -17,7 +17,7 @@ use tokio::sync::Notify;
 /// The time between two warnings that somebody found no place.
 const MINUTE: Duration = Duration::from_secs(60);
 
-/// What a connection is, as far as places go.
+/// Kind of a connection, as far as places go.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// Plain HTTP, as a WebSocket is until it is one.
@@ -205,7 +205,7 @@ impl Place {
         self.signs.only_watches.store(true, Ordering::Relaxed);
     }
 
-    /// Who converses there.
+    /// Notes the client that converses there.
     pub fn serves(&self, client: &Arc<Client>) {
         if let Some(seat) = self.places.taken().seats.get_mut(&self.number) {
             seat.client = Some(client.clone());

@@ -262,7 +262,7 @@ impl Recorder {
     /// Opens the first file and starts the worker.
     ///
     /// # Errors
-    /// [`Error::OutputExists`]; [`Error::Write`]: the file can not be made, or there is less room than
+    /// [`Error::OutputExists`]; [`Error::Write`]: the file cannot be made, or there is less room than
     /// `min_free` already.
     pub fn start(settings: Settings) -> Result<Recorder> {
         let shared = Arc::new(Shared::default());

@@ -129,7 +129,7 @@ fn is_text(query: &str) -> bool {
     std::str::from_utf8(&bytes).is_ok()
 }
 
-/// What is answered to any other method.
+/// Answer to any other method.
 pub(super) async fn not_posted() -> Response<Body> {
     let mut refused = refusal(
         StatusCode::METHOD_NOT_ALLOWED,

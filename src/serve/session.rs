@@ -280,7 +280,7 @@ impl Session {
         self.owned.give_back(&self.hub, &self.client);
     }
 
-    /// What comes next is of this sensor, where it does not say; no number of a packed stream is bound.
+    /// Names the sensor of what comes next, where it does not; no number of a packed stream is bound.
     #[cfg(any(test, feature = "nats", feature = "zenoh"))]
     pub fn of_subject(&mut self, id: &str) {
         self.bound.clear();

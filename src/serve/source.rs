@@ -189,7 +189,7 @@ impl Source {
     /// and `?token-file=FILE`.
     ///
     /// # Errors
-    /// [`Error::Usage`] with what is known; the token file can not be read.
+    /// [`Error::Usage`] with what is known; the token file cannot be read.
     pub fn parse(text: &str) -> Result<Source> {
         let (remote, parameters) = Remote::with_parameters(text, |p| OURS.contains(&p))?;
         let refuse = |what: String| {

@@ -23,11 +23,11 @@ use strapd_recording::text::printable;
 pub(super) const FORMAT: u32 = 2;
 /// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
-/// No attitude is less certain, rad^2: one of which nothing is known has pi^2 about each axis.
+/// Largest variance, rad^2: an attitude of which nothing is known has pi^2 about each axis.
 const MAX_VARIANCE: f64 = 1e3;
 /// Rounding of a variance of nothing.
 const ROUNDING: f64 = 1e-12;
-/// No body turns faster, rad/s.
+/// Largest rate, rad/s.
 const MAX_RATE: f64 = 1e9;
 /// The last attitude of a sensor, and between which axes it is.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -146,7 +146,7 @@ impl Saved {
     /// Checks that a daemon can have saved it.
     ///
     /// # Errors
-    /// In words: what can not be.
+    /// In words: what cannot be.
     pub(super) fn check(&self) -> std::result::Result<(), String> {
         let norm = self.q.iter().map(|c| c * c).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > 1e-6 {
@@ -173,7 +173,7 @@ impl Saved {
         }
     }
 
-    /// As it was.
+    /// Attitude as it was.
     ///
     /// # Errors
     /// In words: it is between other axes than those of the stream that is to go on from it.
@@ -205,7 +205,7 @@ impl Saved {
 /// Checks that a daemon can have saved all of them.
 ///
 /// # Errors
-/// In words: which sensor's state can not be, and why.
+/// In words: which sensor's state cannot be, and why.
 pub(super) fn check(sensors: &Sensors) -> std::result::Result<(), String> {
     sensors.iter().try_for_each(|(id, saved)| {
         let named = |why| format!("sensor {}: {why}", printable(id));
@@ -318,7 +318,7 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 /// The file that is locked in place of the one at `path`.
 ///
 /// # Errors
-/// [`Error::Write`]: another daemon has it, or it can not be made.
+/// [`Error::Write`]: another daemon has it, or it cannot be made.
 fn locked(path: &Path) -> Result<File> {
     let lock = beside(path, ".lock");
     let failed = |path: &Path, source| Error::Write {

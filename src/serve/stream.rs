@@ -74,7 +74,7 @@ pub struct SensorStream {
     intervals: Intervals,
     /// Check of the unit of its stamps.
     stamp_unit: StampUnit,
-    /// What was asked of it.
+    /// Reset that was asked of it.
     resetting: Resetting,
     /// First stamp of the run.
     first: Option<Nanos>,
@@ -94,7 +94,7 @@ pub struct SensorStream {
     told: u32,
     counted: Counts,
     losing: Losing,
-    /// Specific forces came that this attitude can not use.
+    /// Specific forces came that this attitude cannot use.
     has_unused_forces: bool,
     /// Forces and fields that came before the first rate, the last few.
     early: VecDeque<RawSample>,
@@ -114,7 +114,7 @@ enum Joining {
 /// The plan as it is for live streams: `auto` is the method without latency.
 ///
 /// # Errors
-/// In words, with the flag that helps: what a live stream can not do.
+/// In words, with the flag that helps: what a live stream cannot do.
 pub fn live_plan(plan: &Plan) -> Result<Plan, Diagnostic> {
     let mut plan = plan.clone();
     if plan.method == Method::Auto {
@@ -346,7 +346,7 @@ impl SensorStream {
     /// `plan` is that of [`SensorStream::new`]. What is to be known of a run that has begun comes back.
     ///
     /// # Errors
-    /// The fault to answer with: a run can not begin with these samples.
+    /// The fault to answer with: a run cannot begin with these samples.
     pub fn join(
         &mut self,
         plan: &Plan,
@@ -651,7 +651,7 @@ fn expecting(plan: &Plan, forces_beside: bool) -> Plan {
     }
 }
 
-/// What a verdict means to the one who sent the sample, and what helps.
+/// Meaning of a verdict for the one who sent the sample, and what helps.
 fn explained(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NoGyro => "a sample without a body rate (absent, or null as NaN becomes in JSON)",

@@ -136,7 +136,7 @@ impl Request {
     /// Everything the page draws.
     ///
     /// # Errors
-    /// In words: what can not be, or is too much.
+    /// In words: what cannot be, or is too much.
     fn answer(&self) -> Result<Value, String> {
         let (course, methods) = self.course()?;
         let points = self.points.unwrap_or(POINTS);

@@ -46,7 +46,7 @@ pub enum Message {
     Poll,
     /// Be elsewhere in a replay.
     Playback(Action),
-    /// Begin a sensor's attitude anew; or why that can not be, which is no fault of samples.
+    /// Begin a sensor's attitude anew; or why that cannot be, which is no fault of samples.
     Reset(Result<Reset, Fault>),
     /// Reference against which the sensors are compared.
     Reference(Box<Reference>),
@@ -291,7 +291,7 @@ fn name(text: &str) -> Result<String, Fault> {
     exact_name(text).map_err(|why| undecodable(&why))
 }
 
-/// The fault of a line that can not be decoded.
+/// The fault of a line that cannot be decoded.
 #[must_use]
 pub fn undecodable(why: &Undecodable) -> Fault {
     match why {

@@ -68,10 +68,10 @@ impl fmt::Debug for Cloud {
     }
 }
 
-/// What was listed.
+/// Keys that were listed.
 #[derive(Debug, Default)]
 pub(super) struct Keys {
-    /// How many keys there were, and how many of them are wanted.
+    /// Number of keys there were, and how many of them are wanted.
     pub(super) looked_at: usize,
     pub(super) wanted: usize,
     /// The first of those.
@@ -91,7 +91,7 @@ fn both<S: ObjectStore + MultipartStore>(store: S) -> Both {
 struct Answered {
     status: AtomicU16,
     asked_millis: AtomicU64,
-    /// What the body is said to be, where the store itself answered, and not who gives credentials.
+    /// Content type of the body, where the store itself answered, and not who gives credentials.
     form: Mutex<Option<String>>,
 }
 
@@ -353,7 +353,7 @@ impl Cloud {
                 .into()
             }
             // What a server of credentials says is not ours to print.
-            None => Diagnostic::new("the store can not be asked with these credentials")
+            None => Diagnostic::new("the store cannot be asked with these credentials")
                 .help(variables(&self.scheme))
                 .into(),
         }
@@ -434,7 +434,7 @@ struct Speaker {
     is_refused_plain: Arc<AtomicBool>,
     /// Pages of a listing since the last key.
     empty_pages: Arc<AtomicUsize>,
-    /// What was answered last, for requests that follow each other.
+    /// Last answer, for requests that follow each other.
     latest: Arc<Answered>,
 }
 

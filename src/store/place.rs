@@ -12,7 +12,7 @@ use std::ops::Range;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::address::Address;
 
-/// No store takes a larger object: what is counted from what a server claims must not overflow.
+/// Largest object that is believed: what is counted from what a server claims must not overflow.
 const MOST: u64 = 1 << 50;
 
 fn too_large(size: u64) -> Fault {
@@ -22,7 +22,7 @@ fn too_large(size: u64) -> Fault {
     .into()
 }
 
-/// Where an object is.
+/// Place of an object.
 #[derive(Debug)]
 pub(super) enum Place {
     Web(Web),

@@ -142,7 +142,7 @@ async fn in_parts(
     // What fails here is swept up by the store, if it was told to; the first failure is what matters.
     if again(patience, || cloud.give_up(&id)).await.is_err() {
         tracing::warn!(
-            "its parts could not be given up: they can not be read, and are kept until the store sweeps them up"
+            "its parts could not be given up: they cannot be read, and are kept until the store sweeps them up"
         );
     }
     Err(why)

@@ -125,7 +125,7 @@ fn content_range(text: &str) -> Option<(u64, u64)> {
 }
 
 fn no_range(what: &str) -> Fault {
-    Diagnostic::new(format!("the server can not be read from: {what}"))
+    Diagnostic::new(format!("the server cannot be read from: {what}"))
         .help("save it to a file first")
         .into()
 }

@@ -307,7 +307,7 @@ fn what_is_no_calibration_of_this_sensor_is_refused_or_said() {
     assert!(said.contains("as calibrated"), "{said}");
 }
 
-/// A truncation that the data of a stream can not show in time.
+/// A truncation that the data of a stream cannot show in time.
 #[test]
 fn a_known_step_of_truncation_is_undone_in_what_can_be_read_only_once() {
     let dir = tempfile::tempdir().unwrap();

@@ -16,7 +16,7 @@ use strapd_attitude::setting::Choice;
 use strapd_recording::Selection;
 use strapd_recording::pool::Pool;
 
-/// What is found of the gyro alone, unless a test asks for more: that it is alone is none of it.
+/// Findings of the gyro alone, unless a test asks for more: that it is alone is none of them.
 fn found(path: &Path) -> Vec<Finding> {
     let pool = Pool::new(2).unwrap();
     let asked = Examination {

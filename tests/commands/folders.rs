@@ -1,5 +1,5 @@
 //! Promise: a folder that a phone or a recorder wrote is a recording: one file has the rates, those beside it what
-//! corrects them, paired by their stamps. What is used is said; what can not be told is not guessed.
+//! corrects them, paired by their stamps. What is used is said; what cannot be told is not guessed.
 
 use crate::program::{Ran, strapd, strapd_fed};
 use crate::replays::fixture;
@@ -325,7 +325,7 @@ fn files_that_name_their_columns_are_told_by_them() {
     replayed(at, "phone", "--aid auto").1.done();
     let product: f64 = by_phyphox.iter().zip(last(at)).map(|(a, b)| a * b).sum();
     assert!(product.abs() > 1.0 - 1e-9, "{product}");
-    // Which of two forces is meant can not be told: said, and none is used.
+    // Which of two forces is meant cannot be told: said, and none is used.
     put(
         "Acceleration B.csv",
         written(

@@ -1,4 +1,5 @@
-//! Tables in Parquet as recordings: the bits of the same table as text, whoever wrote it, and of damaged ones what is whole.
+//! Tables in Parquet as recordings: the bits of the same table as text, whoever wrote it, and of damaged ones what is
+//! whole.
 
 use crate::program::{Ran, strapd, strapd_fed};
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
 //! Promise: `strapd report` says on one self-contained page what is good and what is wrong about any log,
-//! and what it can not say it says so.
+//! and what it cannot say it says so.
 
 mod browser;
 mod pages;

@@ -229,8 +229,8 @@ fn the_report_has_its_calibration() {
     assert!((gravity("calibrated") - 9.81).abs() < 0.02, "{smooth}");
 }
 
-/// A wheeled robot out of doors, 395 s, of which gravity does not show the bias about the vertical; the gyro alone is 45 degrees
-/// off at most. Against its own orientation.
+/// A wheeled robot out of doors, 395 s, of which gravity does not show the bias about the vertical; the gyro alone is
+/// 45 degrees off at most. Against its own orientation.
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn a_wheeled_robot_is_not_turned_away() {

@@ -1,4 +1,5 @@
-//! Promise: stamps in another unit than their name says are refused with the setting that reads them, and a fast sensor is not.
+//! Promise: stamps in another unit than their name says are refused with the setting that reads them, and a fast
+//! sensor is not.
 
 use crate::program::{Ran, strapd, strapd_fed};
 use std::path::Path;

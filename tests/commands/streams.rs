@@ -223,7 +223,7 @@ fn attitudes_from_lines_are_logged_at_their_stamps() {
 
 #[test]
 fn what_is_lost_in_a_log_is_lost_and_counted_through_a_pipe_of_lines_too() {
-    // NaN can not be written as JSON: the line says null, and must not be passed over.
+    // NaN cannot be written as JSON: the line says null, and must not be passed over.
     let dir = tempfile::tempdir().unwrap();
     let mut samples = motion(300);
     samples[0].gyro[1] = f64::NAN;

@@ -1,4 +1,5 @@
-//! Inputs nobody well-meaning sends: changed logs through every command, and parsers whose work is to grow with the input.
+//! Inputs nobody well-meaning sends: changed logs through every command, and parsers whose work is to grow with the
+//! input.
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,10 +1,12 @@
 //! Promise: no bytes from outside make anything panic, hang or lie. Every parser, fed with its
 //! good inputs (`fuzz/seeds`) changed at random: the functions are those of the fuzzers in `fuzz/`.
 //!
-//! `cargo test` tries a few thousand cases of each, in seconds; `STRAPD_MUTATIONS=1000000 cargo test --release --test hostile
-//! mutations` as many, `STRAPD_MUTANTS=200000` as many changed logs through all commands, half of them changed as their formats
-//! know them; `STRAPD_MUTANTS_OF=db3` leaves it at those of one format. `.ci/run` and `.ci/full` say how many are asked of a
-//! change.
+//! `cargo test` tries a few thousand cases of each, in seconds; `STRAPD_MUTATIONS=1000000 cargo test --release --test
+//! hostile
+//! mutations` as many, `STRAPD_MUTANTS=200000` as many changed logs through all commands, half of them changed as
+//! their formats
+//! know them; `STRAPD_MUTANTS_OF=db3` leaves it at those of one format. `.ci/run` and `.ci/full` say how many are
+//! asked of a change.
 
 #[cfg(target_os = "linux")]
 mod commands;
@@ -120,7 +122,7 @@ fn survives(target: &str, cases: usize, parse: fn(&[u8])) {
 /// Processor time of one input.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// For every parser, unless more are asked for: together within ten seconds of one core.
+/// Number of cases for every parser, unless more are asked for: together within ten seconds of one core.
 const CASES: usize = 4_000;
 
 /// The cases of each parser.

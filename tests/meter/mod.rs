@@ -1,13 +1,14 @@
-//! Bounds on work -> processor time, which is the same on a busy machine; a bound by the clock is a last resort, ten times as far.
+//! Bounds on work -> processor time, which is the same on a busy machine; a bound by the clock is a last resort, ten
+//! times as far.
 #![allow(dead_code, unreachable_pub)]
 
 use std::fmt::Display;
 use std::time::{Duration, Instant};
 
-/// How much farther a bound by the clock is than the one on processor time.
+/// Ratio of a bound by the clock to the one on processor time.
 pub const LAST_RESORT: u32 = 10;
 
-/// Between two readings of the processor time, each of which costs ten microseconds.
+/// Time between two readings of the processor time, each of which costs ten microseconds.
 const OFTEN: Duration = Duration::from_secs(1);
 
 /// Processor time of this thread so far; `None` where the system does not tell.

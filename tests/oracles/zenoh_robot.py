@@ -113,7 +113,7 @@ class Robot:
         self.token = session.liveliness().declare_token(
             f"@ros2_lv/{domain}/{session.zid()}/0/{random.randrange(10**9)}/MP/%/%robot/{node}/{mangled}/{TYPE}/{hash_}/{qos}"
         )
-        # Reliable, keep all: who can not send waits.
+        # Reliable, keep all: who cannot send waits.
         self.publisher = session.declare_publisher(self.key, congestion_control=zenoh.CongestionControl.BLOCK)
 
     def attachment(self):

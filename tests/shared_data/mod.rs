@@ -1,6 +1,6 @@
-//! Where the recordings and golden vectors lie. They are not part of this repository: a test that
-//! needs them is marked `#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]` (`build.rs`), and is
-//! listed as ignored on a machine without them.
+//! Place of the recordings and golden vectors. They are not part of this repository: a test that
+//! needs them is marked `#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]`
+//! (`build.rs`), and is listed as ignored on a machine without them.
 
 use std::path::{Path, PathBuf};
 

@@ -34,6 +34,7 @@
 
 mod aided;
 mod beside;
+mod bounds;
 mod calibration;
 mod covariance;
 mod filter;

@@ -98,7 +98,7 @@ impl Conditioner {
     /// A conditioner for one stream.
     ///
     /// # Errors
-    /// [`SettingsError`] when a setting can not be; the text names the flag.
+    /// [`SettingsError`] when a setting cannot be; the text names the flag.
     pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
         settings.validate()?;
         let max_gap_nanos = secs_to_nanos(settings.max_gap_secs);

@@ -1,4 +1,4 @@
-//! Why something can not be done, and apart from it what helps. Pure.
+//! Why something cannot be done, and apart from it what helps. Pure.
 //!
 //! Two fields and not one text, because who is told differs: a terminal shows the help on a line of its own, a page
 //! behind a semicolon, a program in Python reads it as `error.help`.
@@ -55,13 +55,13 @@ impl Diagnostic {
         self
     }
 
-    /// Its stable name, where it has one.
+    /// Stable name, if it has one.
     #[must_use]
     pub fn code(&self) -> Option<&'static str> {
         self.code
     }
 
-    /// What can not be done, and why.
+    /// Text of what cannot be done, and why.
     #[must_use]
     pub fn what(&self) -> &str {
         &self.what

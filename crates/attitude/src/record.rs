@@ -359,7 +359,7 @@ pub enum Verdict {
     DuplicateStamp,
     /// Older than what was already integrated, beyond the reorder window.
     Late,
-    /// Its stamp is absent, or zero while others' are not.
+    /// Absent stamp, or one of zero while others' are not.
     NoStamp,
     /// Outside `--start`, `--until`.
     Trimmed,
@@ -368,7 +368,7 @@ pub enum Verdict {
     Restamped,
     /// Stamp that leaps far ahead, while its successors carry on from its predecessors.
     StrayStamp,
-    /// Its stamp is more than 146 years from the epoch.
+    /// Stamp more than 146 years from the epoch.
     FarStamp,
 }
 

@@ -4,7 +4,7 @@
 
 use std::fmt;
 
-/// A motion can not have this parameter.
+/// A motion cannot have this parameter.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MotionError {
     /// Name of the parameter.
@@ -15,7 +15,7 @@ pub struct MotionError {
 
 impl fmt::Display for MotionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} can not be {}", self.what, self.value)
+        write!(f, "{} cannot be {}", self.what, self.value)
     }
 }
 

@@ -82,7 +82,7 @@ const FASTEST_HZ: f64 = 1e6;
 /// Longest run, s: 31 years.
 const LONGEST_SECS: f64 = 1e9;
 
-/// A sampling that can not be.
+/// A sampling that cannot be.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum SamplingError {
@@ -118,7 +118,7 @@ impl From<&SamplingError> for Diagnostic {
                 what,
                 value,
                 allowed,
-            } => Diagnostic::new(format!("{what} can not be {value}: {allowed}")),
+            } => Diagnostic::new(format!("{what} cannot be {value}: {allowed}")),
             SamplingError::UnderSampled { rate_hz, needed_hz } => Diagnostic::new(format!(
                 "at {rate_hz} Hz the motion turns half a turn or more from sample to sample"
             ))

@@ -199,7 +199,7 @@ impl SymmetricTop {
     /// Inertia about the pivot.
     ///
     /// # Errors
-    /// [`InertiaError`] for moments so far apart that their matrix can not be inverted.
+    /// [`InertiaError`] for moments so far apart that their matrix cannot be inverted.
     pub fn rotor(&self) -> Result<Rotor, InertiaError> {
         Rotor::new(Matrix3::from_diagonal(&Vector3::new(
             self.transverse,

@@ -440,7 +440,7 @@ impl Decoder {
     pub fn has_good_stamps(&self, first: &[(Nanos, Vec<u8>)]) -> bool {
         let mut samples = Vec::new();
         for (log, payload) in first {
-            // What can not be decoded says nothing about stamps.
+            // What cannot be decoded says nothing about stamps.
             let _ = self.decode(payload, *log, *log, &mut samples);
         }
         let mut stamps: Vec<i64> = samples.iter().filter_map(|s| Some(s.header?.0)).collect();

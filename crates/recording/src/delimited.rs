@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A stage of its own because a table has no names but those of its first rows, and everybody calls them otherwise:
-//! what each column holds, in which unit, is decided once, from the names and the first rows, and said; what can not be
+//! what each column holds, in which unit, is decided once, from the names and the first rows, and said; what cannot be
 //! told is refused with the flag that says it ([`Columns`]).
 
 mod clock;

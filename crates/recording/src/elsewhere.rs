@@ -23,7 +23,7 @@ pub trait Object: Debug + Send + Sync {
     /// Fills `into` from `offset` on; less only at the end.
     ///
     /// # Errors
-    /// They can not be had, or are others by now.
+    /// They cannot be had, or are others by now.
     fn read_at(&self, into: &mut [u8], offset: u64) -> io::Result<usize>;
 
     /// Says what will be read from now on, in this order, so that it is fetched before it is asked for, and at most

@@ -1,4 +1,4 @@
-//! Why a log can not be read, or not as a whole, or holds no samples that were meant. Bad samples are not here: they
+//! Why a log cannot be read, or not as a whole, or holds no samples that were meant. Bad samples are not here: they
 //! are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use crate::decode::defining;
@@ -103,14 +103,14 @@ pub enum Error {
         /// Topics that exist, one indented line each.
         topics: String,
     },
-    /// A topic's messages can not be decoded.
+    /// A topic's messages cannot be decoded.
     Unsupported {
         /// Path of the file.
         path: PathBuf,
         /// Topic, type, encoding, why, and what helps.
         what: Diagnostic,
     },
-    /// A run over this input can not be carried out with these settings.
+    /// A run over this input cannot be carried out with these settings.
     Topic {
         /// Path of the file.
         path: PathBuf,
@@ -181,7 +181,7 @@ impl From<&Error> for Diagnostic {
             ))
             .help("TMPDIR=FOLDER with room, or save it to a file first"),
             Error::NotTwice { path } => Diagnostic::new(format!(
-                "{}: a stream can not be surveyed before it is read",
+                "{}: a stream cannot be surveyed before it is read",
                 path.display()
             )),
             Error::NoImuTopic {

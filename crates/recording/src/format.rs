@@ -198,7 +198,7 @@ impl Format {
     /// The format of a regular file: by its first bytes, and where these tell nothing by its name.
     ///
     /// # Errors
-    /// It can not be opened or read, is a directory, or empty; it is of a format that is known and not read.
+    /// It cannot be opened or read, is a directory, or empty; it is of a format that is known and not read.
     pub fn of_file(path: &Path) -> Result<Option<Format>> {
         let mut file = open(path)?;
         let length = file.metadata().map_err(|source| Error::Read {
@@ -283,7 +283,7 @@ fn has_telemetry(file: &mut (impl Read + Seek), length: u64) -> std::io::Result<
 /// second. Empty when nothing comes.
 ///
 /// # Errors
-/// The stream can not be read.
+/// The stream cannot be read.
 pub(crate) fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
     while head.len() < HEAD && !tells_enough(&head) {

@@ -1,11 +1,11 @@
 //! GPMF, the telemetry of GoPro's cameras, alone or as a track of a video -> the records MCAP has for it. Pure.
 //!
-//! A stage of its own because a camera writes one payload a second, with hundreds of samples and no stamp for any of them:
-//! what a sample is, and when, comes from the payload's place in the track and from what it says of itself.
+//! A stage of its own because a camera writes one payload a second, with hundreds of samples and no stamp for any of
+//! them: what a sample is, and when, comes from the payload's place in the track and from what it says of itself.
 //!
 //! ```text
-//! video -> movie (where payloads lie, and when) -> klv (keys, numbers) -> stream (samples, axes) -> transcriber (stamps, messages)
-//! ```
+//! video -> movie (where payloads lie, and when) -> klv (keys, numbers) -> stream (samples, axes) -> transcriber
+//! (stamps, messages) ```
 //!
 //! Layouts: <https://github.com/gopro/gpmf-parser>, its README; ISO 14496-12 for the boxes of a video.
 
@@ -21,7 +21,7 @@ pub(crate) use transcriber::Transcriber;
 /// The first bytes of a stream without a video around it.
 pub(crate) const MAGIC: [u8; 5] = *b"DEVC\0";
 
-/// What a payload is taken to last where nothing says it, ns: cameras write one a second.
+/// Duration of a payload where none is stated, ns: cameras write one a second.
 pub(crate) const SECOND: u64 = 1_000_000_000;
 
 /// Longest payload that is read, bytes; those in use are a hundredth of that.

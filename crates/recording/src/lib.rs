@@ -15,7 +15,8 @@
 //! # Ok::<(), Error>(())
 //! ```
 //!
-//! MCAP, ULog, ROS 1 bags, lines of JSON, tables, a folder of one of them, a pipe, `-`, or an address: `examples/samples_of_a_recording.rs` is the whole program.
+//! MCAP, ULog, ROS 1 bags, lines of JSON, tables, a folder of one of them, a pipe, `-`, or an address:
+//! `examples/samples_of_a_recording.rs` is the whole program.
 //!
 //! ```text
 //! file, stream -> format -> mcap  -> decode            -> recording -> RawSample
@@ -47,7 +48,7 @@
 //! | [`elsewhere`] | an address -> what is read there as a file is | I/O |
 //! | [`text`] | outside text -> what a terminal may show | pure |
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
-//! | [`error`] | why a log can not be read | |
+//! | [`error`] | why a log cannot be read | |
 
 pub mod address;
 pub mod attitude_line;

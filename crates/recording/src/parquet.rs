@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A room of its own, and not another's crate, because those panic on damaged files: here no length, place or count is
-//! believed before it is checked, a page costs at most 64 MiB, and one that can not be read costs its own rows, which are
-//! counted.
+//! believed before it is checked, a page costs at most 64 MiB, and one that cannot be read costs its own rows, which
+//! are counted.
 
 mod column;
 mod encoding;

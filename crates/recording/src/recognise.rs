@@ -186,7 +186,7 @@ pub fn foreign(first: &[u8], last: &[u8]) -> Option<Foreign> {
     marked(first, last).or_else(|| text(first))
 }
 
-/// The same of what has a mark that text can not have by chance: all that may be asked of a stream, which may
+/// The same of what has a mark that text cannot have by chance: all that may be asked of a stream, which may
 /// begin in the middle of a line. Fewer bytes tell less.
 #[must_use]
 pub fn marked(first: &[u8], last: &[u8]) -> Option<Foreign> {

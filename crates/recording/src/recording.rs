@@ -1,8 +1,9 @@
 //! A recording of any kind -> what is in it, and its samples in order. I/O.
 //!
-//! A room of its own because whoever wants samples asks the same things first, whatever the container: what it is, which
-//! topics carry rates, whose they are, and how each message is read. [`opened::Recording`] is all of it at once; a program that does
-//! more with messages than to take samples (`strapd-replay`) walks it with routes of its own.
+//! A room of its own because whoever wants samples asks the same things first, whatever the container: what it is,
+//! which
+//! topics carry rates, whose they are, and how each message is read. [`opened::Recording`] is all of it at once; a
+//! program that does more with messages than to take samples (`strapd-replay`) walks it with routes of its own.
 //!
 //! ```text
 //! path, stream -> input -> opened (survey, first messages, sources) -> topics -> samples

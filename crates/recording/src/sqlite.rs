@@ -2,7 +2,7 @@
 //!
 //! A stage of its own because a recorder that is killed leaves a database SQLite itself may refuse, and stops reading
 //! at
-//! the first bad page of. Here each page is looked at once, whatever the others say of it; what can not be read costs
+//! the first bad page of. Here each page is looked at once, whatever the others say of it; what cannot be read costs
 //! its own rows, and is told.
 //!
 //! ```text
@@ -48,6 +48,6 @@ pub(crate) trait Pages {
     /// whole.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     fn page(&mut self, number: u32, into: &mut Vec<u8>) -> io::Result<bool>;
 }

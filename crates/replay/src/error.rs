@@ -35,7 +35,7 @@ pub enum Error {
     },
     /// Standard output was closed by its reader; ends the run quietly.
     BrokenPipe,
-    /// An address can not be listened on.
+    /// An address cannot be listened on.
     Bind {
         /// Address.
         address: Address,
@@ -49,14 +49,14 @@ pub enum Error {
         /// Why.
         source: io::Error,
     },
-    /// A daemon can not be reached, or has gone.
+    /// A daemon cannot be reached, or has gone.
     Remote {
         /// Address.
         address: Address,
         /// Diagnostic: what, and what it said before.
         what: Diagnostic,
     },
-    /// A combination of arguments that can not be.
+    /// A combination of arguments that cannot be.
     Usage(Diagnostic),
 }
 
@@ -151,7 +151,7 @@ impl From<SpoolError> for Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// A combination of arguments that can not be.
+    /// A combination of arguments that cannot be.
     #[cold]
     #[inline(never)]
     pub fn usage(what: impl Into<Diagnostic>) -> Error {

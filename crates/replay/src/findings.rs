@@ -116,7 +116,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
     found
 }
 
-/// What the samples show, and what integrating them does: the same as a replay says of its run.
+/// Findings from the samples and from integrating them: the same as a replay reports of its run.
 fn of_run_and_samples(topic: &CheckedTopic) -> Vec<Finding> {
     let summary = match &topic.replayed {
         Ok(summary) => summary,

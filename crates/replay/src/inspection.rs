@@ -35,7 +35,7 @@ pub struct Inspection {
     pub rests: Rests,
     /// The bias they give.
     pub bias: Option<stillness::BiasEstimate>,
-    /// What becomes of its samples in a run by default.
+    /// Outcomes of its samples in a run by default.
     pub counts: Counts,
     /// Payloads that could not be decoded.
     pub undecodable: u64,
@@ -91,7 +91,7 @@ impl Aids {
             false => first,
         };
         let mut notes = Vec::new();
-        // With `auto` what can not be is a warning.
+        // With `auto` what cannot be is a warning.
         let aiding = Aiding::decide(&plan, resolved, of_forces, &mut notes).unwrap_or_default();
         let forces = || {
             of_forces
@@ -132,11 +132,11 @@ pub struct Checked {
     pub profile: String,
     /// Origin of attitudes that are no recording.
     pub made_before: Option<MadeBefore>,
-    /// Topics that sound like an IMU's and can not be decoded: why.
+    /// Topics that sound like an IMU's and cannot be decoded: why.
     pub refused: Vec<Diagnostic>,
     /// Nothing was to correct the attitude that is judged.
     pub is_gyro_alone: bool,
-    /// Its topics of samples.
+    /// Topics of samples.
     pub topics: Vec<CheckedTopic>,
     /// Topics of samples beyond those, which were not examined.
     pub left_out: Vec<String>,
@@ -170,6 +170,6 @@ impl Checked {
 pub struct CheckedTopic {
     /// Statistics of the samples as recorded.
     pub looked: Inspection,
-    /// What a replay with the same settings makes of them, or why it refuses.
+    /// Summary of a replay with the same settings, or the reason why it refuses.
     pub replayed: std::result::Result<Box<TopicSummary>, Diagnostic>,
 }

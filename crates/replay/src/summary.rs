@@ -89,7 +89,7 @@ pub struct TopicSummary {
     pub sigma_terms: Option<SigmaTerms>,
     /// Drift to be expected from what is not known of the bias, rad/s.
     pub drift: f64,
-    /// Bound on the worst attitude error of the integration itself, rad; `None` where the method can not tell.
+    /// Bound on the worst attitude error of the integration itself, rad; `None` where the method cannot tell.
     pub integration_error: Option<f64>,
     /// Gaps.
     pub gaps: Gaps,
@@ -322,7 +322,7 @@ impl TopicSummary {
         }
     }
 
-    /// What corrected the attitude, what was taken out, what it is at the end, and how well it is known.
+    /// Writes what corrected the attitude, what was taken out, what it is at the end, and how well it is known.
     fn write_attitude(&self, out: &mut String) {
         let (name, lines) = match (self.smoothing(), &self.aided) {
             (Some(smoothing), _) => ("smooth", smoothing.lines()),

@@ -1,4 +1,4 @@
-"""What can go wrong, beside ``ValueError`` for an argument that can not be."""
+"""What can go wrong, beside ``ValueError`` for an argument that cannot be."""
 
 from __future__ import annotations
 

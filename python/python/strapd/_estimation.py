@@ -160,7 +160,7 @@ def estimate(
         ``rate``. What could not be smoothed as asked is a :class:`SmoothingWarning`.
     :param strict: raise :class:`Error` where samples were lost, instead of a :class:`LossWarning`.
     :param settings: see :class:`Settings`.
-    :raises ValueError: an argument that can not be, by name.
+    :raises ValueError: an argument that cannot be, by name.
     :raises Error: the samples do not allow what is asked for.
     """
     if aid == "auto" and mag is not None:

@@ -101,8 +101,8 @@ def replay(path: Path, *, strict: bool = False, **flags: Any) -> Union[Attitude,
     :param strict: raise :class:`Error` where samples were lost, instead of a :class:`LossWarning`.
     :param flags: every estimation flag of the command by its name, ``-`` as ``_``: ``topic``, ``aid``, ``method``, ``kind``, ``init``, ...
     :returns: one :class:`Attitude`, or with ``topic="all"`` a dict of one for each topic.
-    :raises ValueError: an argument that can not be.
-    :raises Error: the log can not be read; the message is the command's.
+    :raises ValueError: an argument that cannot be.
+    :raises Error: the log cannot be read; the message is the command's.
     """
     words, known = arguments(flags)
     words = {**of_the_environment(), **words}

@@ -66,7 +66,7 @@ pub(super) struct Gathered {
 /// Decodes, conditions and gathers the topic chosen; at most `capacity` angles are held.
 ///
 /// # Errors
-/// The log can not be read, no topic or several, or a topic without a rate.
+/// The log cannot be read, no topic or several, or a topic without a rate.
 pub(super) fn gather(
     input: &Input,
     (selection, plan): (&Selection, &Plan),

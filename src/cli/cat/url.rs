@@ -24,7 +24,7 @@ const TABLE_HEADER: &str = "               stamp s        qw        qx        qy
 /// Runs it.
 ///
 /// # Errors
-/// Nobody answers, or whoever answered has gone; stdout can not be written.
+/// Nobody answers, or whoever answered has gone; stdout cannot be written.
 pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
     let file_flags = [
         (args.topic.is_some(), "--topic", "--id NAME names a sensor"),

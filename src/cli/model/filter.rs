@@ -1,7 +1,7 @@
 //! Requests as NDJSON on standard input -> answers on standard output, one line each, in order. I/O.
 //!
 //! The loop every model shares. A request is a JSON object read into a type of the model's own
-//! (`serde`, unknown fields refused by name); an answer is a JSON object. What can not be answered is
+//! (`serde`, unknown fields refused by name); an answer is a JSON object. What cannot be answered is
 //! `{"error": ".."}` on its line, and the loop goes on.
 
 use crate::cli::Outcome;
@@ -35,7 +35,7 @@ impl From<String> for Refusal {
 /// Answers every request on standard input.
 ///
 /// # Errors
-/// Standard input can not be read or standard output not be written.
+/// Standard input cannot be read or standard output not be written.
 pub(super) fn run<R: DeserializeOwned>(
     answer: impl FnMut(R) -> std::result::Result<Value, Refusal>,
 ) -> Result<Outcome> {

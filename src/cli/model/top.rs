@@ -74,7 +74,7 @@ struct Request {
 /// Runs it.
 ///
 /// # Errors
-/// Flags that can not be; standard input or output fails.
+/// Flags that cannot be; standard input or output fails.
 pub(super) fn run(global: &Global, args: &Top) -> Result<Outcome> {
     if args.compare {
         print(&tables::text().map_err(|e| Error::usage(format!("model top: {e}")))?)?;

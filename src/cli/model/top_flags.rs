@@ -56,7 +56,7 @@ impl TopFlags {
     /// The top.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a body that can not be.
+    /// [`Error::Usage`] for a body that cannot be.
     pub(crate) fn body(&self) -> Result<SymmetricTop> {
         let seed = SymmetricTop::published();
         let [across, along] = match &self.inertia {

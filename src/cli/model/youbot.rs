@@ -41,7 +41,7 @@ Example:
     /// Pose of the gripper -> every joint vector that takes it there
     #[command(
         after_help = "Request: {\"p\":[3],\"r\":[[3],[3],[3]]} or {\"p\":[3],\"quat\":{\"w\":,\"x\":,\"y\":,\"z\":}}, and
-  \"policy\":\"reject\"|\"keep-position\"|\"keep-approach\"|\"weighted\"   for poses five joints can not take
+  \"policy\":\"reject\"|\"keep-position\"|\"keep-approach\"|\"weighted\"   for poses five joints cannot take
   \"tolerance\":{\"position\":1e-9,\"angle\":1e-9}   of reject (m, rad)
   \"length\":0.3      of weighted: the distance in m that counts as much as a radian
   \"q_current\":[5]   the solution nearest to these is chosen; \"weights\":[5] to weigh joints

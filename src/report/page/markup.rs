@@ -1,4 +1,4 @@
-//! Text -> HTML that can not break the page. Pure.
+//! Text -> HTML that cannot break the page. Pure.
 
 use std::fmt::Write as _;
 

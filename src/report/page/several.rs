@@ -102,7 +102,7 @@ impl Several {
         }
     }
 
-    /// Takes a log that can not be read.
+    /// Takes a log that cannot be read.
     pub fn add_unread(&mut self, file: &str, why: &str) {
         self.count += 1;
         self.unread += 1;
@@ -137,7 +137,7 @@ impl Several {
             (good, "good"),
             (warning, "usable with care"),
             (bad, "with something wrong"),
-            (self.unread, "that can not be read"),
+            (self.unread, "that cannot be read"),
         ];
         let said: Vec<String> = counts
             .into_iter()

@@ -161,7 +161,7 @@ fn at_the_end(s: &TopicSummary, rows: &mut Rows) {
     }
 }
 
-/// What the whole recording told of the sensor, and what that is worth.
+/// Adds what the whole recording told of the sensor, and what that is worth.
 fn smoothed(smoothing: &Smoothing, drawn: Option<&Drawn>, out: &mut String) {
     out.push_str("<h3>Calibration by the whole recording</h3>\n");
     out.push_str(&table("numbers", &Smoothing::HEAD, &smoothing.learned()));

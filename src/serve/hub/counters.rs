@@ -110,7 +110,7 @@ impl Counters {
             counter("resets", "RESET requests taken.", &self.resets),
             counter(
                 "resets_refused",
-                "RESET requests refused: of another's sensor, of none there is, or to an attitude that can not be.",
+                "RESET requests refused: of another's sensor, of none there is, or to an attitude that cannot be.",
                 &self.refused_resets,
             ),
             counter(

@@ -190,7 +190,7 @@ impl Hub {
                 .is_some_and(|owner| owner.is_broker.load(Ordering::Relaxed))
     }
 
-    /// To be called every [`TICK`]: sensors that were silent for longer than they may be give up their places.
+    /// Gives up places of sensors that were silent for longer than they may be; to be called every [`TICK`].
     /// Their attitudes are kept, and go on when they come back.
     pub fn forget_silent(&self) {
         let now = self.tick.fetch_add(1, Ordering::Relaxed) + 1;

@@ -21,7 +21,7 @@ impl Hub {
     ///
     /// # Errors
     /// The fault to answer with: nothing was asked that can be, there is no such sensor, another connection sends it,
-    /// it can not begin so, or this is a replay.
+    /// it cannot begin so, or this is a replay.
     pub fn reset(
         &self,
         asked: Result<Reset, Fault>,

@@ -94,7 +94,7 @@ pub(super) async fn serve(bound: Bound, context: Context) {
         kind,
         || bound.listener.accept(),
         |(stream, _), context, place| {
-            // One whose user can not be told shares with all such.
+            // One whose user cannot be told shares with all such.
             let user = stream.peer_cred().map_or(u32::MAX, |who| who.uid());
             duplex::spawn(stream, Peer::user(name.clone(), user), context, place);
         },

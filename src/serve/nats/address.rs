@@ -81,7 +81,7 @@ impl NatsAddress {
     /// Reads an address from which samples come.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret can not be read.
+    /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret cannot be read.
     pub fn source(text: &str) -> Result<NatsAddress> {
         NatsAddress::parse(text, Way::In)
     }

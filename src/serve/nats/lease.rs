@@ -68,7 +68,7 @@ impl Lease {
     /// Waits until nobody has it, and takes it. The state comes with it.
     ///
     /// # Errors
-    /// In words: the bucket can not be read, or holds what is no state of ours.
+    /// In words: the bucket cannot be read, or holds what is no state of ours.
     pub(super) async fn acquire(
         store: Store,
         key: &str,
@@ -169,7 +169,7 @@ impl Lease {
                 Err(Refused::Now(why)) => log_throttle::warn(
                     "lease",
                     &format!(
-                        "the state of {} can not be written: {why}; trying again, and publishing nothing meanwhile",
+                        "the state of {} cannot be written: {why}; trying again, and publishing nothing meanwhile",
                         self.key
                     ),
                 ),

@@ -64,7 +64,7 @@ struct State {
     glimpse: bool,
     /// Whether this run is to end, for another to begin.
     restart: bool,
-    /// Why it can not go back, if it can not.
+    /// Why it cannot go back, if it cannot.
     forward_only: Option<&'static str>,
     stopped: bool,
     run: u64,

@@ -332,7 +332,7 @@ impl Drop for Poster {
     }
 }
 
-/// How many of these objects so many samples are, counted from the end.
+/// Number of these objects that so many samples are, counted from the end.
 fn objects_of(lines: &[(Option<u64>, usize)], samples: u64) -> u64 {
     let all = lines.last().map_or(0, |(_, end)| *end);
     let used = all.saturating_sub(usize::try_from(samples).unwrap_or(usize::MAX));

@@ -6,7 +6,7 @@ use crate::serve::losses::Lost;
 use serde::Deserialize;
 use strapd_recording::decode::exact_name;
 
-/// What a line that is no sample may still say.
+/// Fields that a line which is no sample may still state.
 #[derive(Deserialize)]
 struct Named {
     id: Option<String>,

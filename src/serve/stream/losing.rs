@@ -1,17 +1,17 @@
-//! What became of a stream's samples -> which verdict loses them all, if one does. Pure.
+//! Outcomes of a stream's samples -> which verdict loses them all, if one does. Pure.
 
 use super::{Joining, SensorStream, explained};
 use crate::serve::fault::Fault;
 use strapd_attitude::record::{Counts, Verdict};
 
-/// What was counted when it was looked last.
+/// Counts at the last look.
 #[derive(Debug, Default)]
 pub(super) struct Losing {
     used: u64,
     counts: Counts,
 }
 
-/// What became of the last samples.
+/// Fate of the last samples.
 #[derive(Debug)]
 pub enum Fate {
     /// Nothing that is known yet.
@@ -23,7 +23,7 @@ pub enum Fate {
 }
 
 impl SensorStream {
-    /// What became of the samples since this was asked last.
+    /// Fate of the samples since the last call.
     pub fn fate(&mut self) -> Fate {
         let counts = self.conditioning().counts;
         let used = counts.used();

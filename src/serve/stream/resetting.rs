@@ -18,7 +18,7 @@ impl SensorStream {
     /// sensor is kept. Says where it will begin.
     ///
     /// # Errors
-    /// In words: it can not begin so.
+    /// In words: it cannot begin so.
     pub fn reset(&mut self, plan: &Plan, initial: Option<Initial>) -> Result<&'static str, String> {
         let asked = initial.unwrap_or(plan.initial);
         let is_aided = self.estimator.filter().is_some();

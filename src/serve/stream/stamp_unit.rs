@@ -8,8 +8,8 @@ use strapd_attitude::condition::Clock;
 use strapd_attitude::record::RawSample;
 use strapd_recording::recording::stated_nanos::{StatedNanos, TooFast};
 
-/// Steps after which they are judged, again whenever their number has doubled, and for the last time: a sender may begin
-/// with what it has held back.
+/// Steps after which they are judged, again whenever their number has doubled, and for the last time: a sender may
+/// begin with what it has held back.
 const FIRST: u64 = 128;
 const LAST: u64 = 8192;
 

@@ -72,7 +72,7 @@ impl Stamps {
 
     /// Takes samples with the bare stamps at their places, and gives those whose stamps are known by
     /// now; `None` where these are all of them, as they are.
-    /// Where the unit can not be told this comes with them, once: they and all others have no stamp.
+    /// Where the unit cannot be told this comes with them, once: they and all others have no stamp.
     pub(super) fn take(
         &mut self,
         lines: &[(Option<u64>, usize)],

@@ -25,7 +25,7 @@ pub fn unreadable(why: &Unreadable) -> Fault {
     Fault::new("bad_packed", why.to_string())
 }
 
-/// The fault of a packed object whose end can not be found.
+/// The fault of a packed object whose end cannot be found.
 #[must_use]
 pub fn broken_packed() -> Fault {
     Fault::new(

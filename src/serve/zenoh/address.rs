@@ -50,7 +50,7 @@ impl ZenohAddress {
     /// Reads an address from which samples come.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret can not be read.
+    /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret cannot be read.
     pub fn source(text: &str) -> Result<ZenohAddress> {
         ZenohAddress::parse(text, Way::In)
     }

@@ -55,7 +55,7 @@ fn config(address: &ZenohAddress) -> Value {
 /// # Errors
 /// In words.
 pub(super) async fn connect(address: &ZenohAddress) -> Result<Session, String> {
-    // What can not be read may hold the password.
+    // What cannot be read may hold the password.
     let config = Config::from_json5(&config(address).to_string())
         .map_err(|_| "zenoh does not take the address's parameters".to_owned())?;
     match timeout(PATIENCE, zenoh::open(config)).await {

@@ -101,7 +101,7 @@ impl Reader {
                 log_throttle::info(&format!("{name} connected"), &format!("{name}: connected"));
                 self.read_on(&link, running).await
             }
-            Err(why) => Some(format!("can not subscribe: {why}")),
+            Err(why) => Some(format!("cannot subscribe: {why}")),
         };
         end(link).await;
         if why.is_none() {

@@ -1,4 +1,4 @@
-//! The same in files, from the command line down: short logs, settings that can not be, and what is
+//! The same in files, from the command line down: short logs, settings that cannot be, and what is
 //! said.
 
 use crate::made_logs::{motion, written};

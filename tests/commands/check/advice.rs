@@ -61,9 +61,9 @@ fn jitter_asks_the_reference_only_where_there_is_one() {
         jitter.unwrap_or_else(|| unreachable!("{found:#?}")).line()
     };
     let without = advice("without.mcap", None);
-    assert!(!without.contains("they can not tell"), "{without}");
+    assert!(!without.contains("they cannot tell"), "{without}");
     let with = advice("with.mcap", Some([1.0, 0.0, 0.0, 0.0]));
-    assert!(with.contains("they can not tell"), "{with}");
+    assert!(with.contains("they cannot tell"), "{with}");
 }
 
 #[test]

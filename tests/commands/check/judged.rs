@@ -276,7 +276,7 @@ fn check_judges_the_attitude_of_replay_with_its_flags() {
     let (alone, _) = found(dir.path(), "s.mcap", "--aid none");
     let says = |all: &[(String, String)]| all.iter().any(|f| f.1 == "gyro-alone");
     assert!(!says(&auto) && says(&alone), "{auto:?} {alone:?}");
-    // A force that can not level is named by both.
+    // A force that cannot level is named by both.
     let tenfold: String = with_field(|_| [1.0, 0.0, 0.0])
         .lines()
         .enumerate()

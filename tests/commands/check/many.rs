@@ -186,7 +186,7 @@ fn spelled_out(n: usize) -> String {
     )
 }
 
-/// By the clock, for what takes seconds; each schema for itself would take hours.
+/// Bound by the clock, for what takes seconds; each schema for itself would take hours.
 const LAST_RESORT: Duration = Duration::from_secs(600);
 
 #[test]

@@ -145,9 +145,10 @@ fn scored(dir: &Path, log: &Path, truth: &Truth, flags: &str) -> [f64; 4] {
 #[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn on_recordings_with_optical_truth_it_is_as_good_as_it_says() {
     let dir = tempfile::tempdir().unwrap();
-    // Found 1.75 / 1.09 and 0.73 / 0.57 (VQF 2.06 / 1.02 and 2.76 / 0.47); 99.9 % within three sigma.
+    // Found 1.90 / 1.07 and 0.73 / 0.57 (VQF 2.06 / 1.02 and 2.76 / 0.47); 99.9 % within three sigma. The first was
+    // 1.75 before gravity told the bias along the main vertical no more than it knows; the mean of 14 is 1.63.
     for (name, total, inclination) in [
-        ("07_undisturbed_fast_rotation_B.mcap", 1.85, 1.15),
+        ("07_undisturbed_fast_rotation_B.mcap", 2.0, 1.15),
         ("15_undisturbed_fast_translation_A.mcap", 0.82, 0.62),
     ] {
         let log = broad(name);
@@ -203,7 +204,8 @@ fn a_specific_force_of_a_topic_of_its_own_is_as_good_as_one_beside_the_rate() {
     let dir = tempfile::tempdir().unwrap();
     let log = broad("15_undisturbed_fast_translation_A.mcap");
     let truth = truth(&log);
-    let flags = "--aid gravity --sample-kind average --undo-truncation off";
+    // From a start that is stated, by one force: only forces beside the rates level by their mean.
+    let flags = "--aid gravity --sample-kind average --undo-truncation off --start 0";
     let beside = scored(dir.path(), &log, &truth, flags);
     // The very same messages, read as another topic's.
     let apart = format!("{flags} --accel-topic /imu/data");
@@ -330,7 +332,7 @@ fn without_a_field_or_where_it_belongs_to_nothing_it_is_said() {
         "replay - -o null: --aid gravity+mag",
         lines(Some),
     );
-    assert!(ran.done().out.contains("NO FIELD"), "{}", ran.out);
+    ran.refused(1, &["--aid gravity+mag", "--mag-topic", "--aid gravity"]);
     for (flags, words) in [
         (
             "--aid none --accel-topic /a",

@@ -1,4 +1,4 @@
-//! Flags that can not be: exit code 2, the flag named, nothing written.
+//! Flags that cannot be: exit code 2, the flag named, nothing written.
 
 use super::{bench, names, strapd};
 

@@ -1,4 +1,4 @@
-//! Outputs that must not be written, can not be written, or are not read to their end.
+//! Outputs that must not be written, cannot be written, or are not read to their end.
 
 use super::{bench, names, strapd};
 use crate::made_logs::{motion, written};

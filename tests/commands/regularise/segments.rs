@@ -123,7 +123,7 @@ fn stamps_without_a_rate_are_refused_with_what_helps() {
     // A rate that falls from 500 Hz to 55 in 20 s.
     let falling = (0..2000_i64).map(|k| 2_000_000 * k + 4000 * k * k);
     for (what, samples, expected) in [
-        ("random walk", rates(at_random), "can not be counted"),
+        ("random walk", rates(at_random), "cannot be counted"),
         ("batches", rates(batches), "batches"),
         ("falling", rates(falling), "it changes"),
     ] {

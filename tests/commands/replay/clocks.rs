@@ -166,12 +166,9 @@ fn a_start_beyond_the_end_leaves_nothing_and_that_is_said() {
         start: Some(60.0),
         ..Plan::default()
     };
-    let summary = done(&replay_with(&path, plan)).unwrap();
-    let topic = only(&summary);
-    assert_eq!(topic.counts.used(), 0);
-    let said = topic.warnings().join("; ");
-    assert!(said.contains("no sample was used"), "{said}");
-    assert!(said.contains("outside start, until"), "{said}");
+    let said = done(&replay_with(&path, plan)).unwrap_err().to_string();
+    assert!(said.contains("start 60: none of the 100 samples"), "{said}");
+    assert!(said.contains("lies in that window"), "{said}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What is decided before the first sample is integrated: of a file of any format from the whole file.
+//! Decisions before the first sample is integrated: of a file of any format from the whole file.
 
 use crate::program::{strapd, strapd_fed};
 use std::fmt::Write as _;

@@ -15,7 +15,7 @@ fn several_logs_stand_side_by_side_in_one_page() {
         dir.path(),
         "report a.mcap <b>&'.mcap c.mcap -o r.html --json",
     );
-    assert_eq!(ran.code, Some(1), "one can not be read: {ran:?}");
+    assert_eq!(ran.code, Some(1), "one cannot be read: {ran:?}");
     let html = std::fs::read_to_string(dir.path().join("r.html")).unwrap();
     asks_nobody(&html);
     let row = |log: &str| {

@@ -1,4 +1,4 @@
-//! Simulations that can not be: which flag, why, with the numbers; nothing is written.
+//! Simulations that cannot be: which flag, why, with the numbers; nothing is written.
 
 use crate::program::strapd;
 

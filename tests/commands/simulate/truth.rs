@@ -58,7 +58,7 @@ fn averages_and_delta_angles_come_back_too() {
             ),
         )
         .done();
-        // A line says what its sample is; an Imu message can not.
+        // A line says what its sample is; an Imu message cannot.
         strapd(
             at,
             &format!("replay a.mcap --sample-kind {kind} -o m.mcap --force"),

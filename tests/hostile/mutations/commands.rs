@@ -150,7 +150,7 @@ fn write(log: &Path, changed: &Changed) {
     }
 }
 
-/// As many changed logs as asked for, from the first asked for.
+/// Runs as many changed logs as asked for, from the first asked for.
 fn work(from: usize, cases: usize) {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("log.mcap"), dir.path().join("out"));

@@ -58,7 +58,7 @@ fn a_case_and_a_method_are_chosen_and_the_error_is_that_of_the_command() {
     // Something is drawn on every canvas.
     let blank = browser.eval("[...document.querySelectorAll('canvas')].filter((c) => !c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v)).length");
     assert_eq!(blank, 0);
-    // What can not be is said, and the page lives on.
+    // What cannot be is said, and the page lives on.
     browser.eval("(() => { const form = document.querySelector('[data-testid=form]'); form.elements.case.value = 'steady-slow'; form.elements.spin_hz.value = '1'; form.dispatchEvent(new Event('input', { bubbles: true })); })()");
     browser.until(
         "the reason",

@@ -275,5 +275,6 @@ fn a_daemon_keeps_the_secrets_it_is_given() {
     daemon.log.read_to_string(&mut log).unwrap();
     assert!(log.contains("403"), "{log}");
     assert_hidden("the log", log.as_bytes(), SECRET);
-    assert_eq!(assert_hidden_in_files(&home, &[SECRET, FOLDER]), 2);
+    // The recording, the state, and the lock beside it.
+    assert_eq!(assert_hidden_in_files(&home, &[SECRET, FOLDER]), 3);
 }

@@ -1,4 +1,5 @@
-//! Stamps in another unit than their name says: a replay refuses them, a daemon says so once, in `STATUS` too, and goes on.
+//! Stamps in another unit than their name says: a replay refuses them, a daemon says so once, in `STATUS` too, and
+//! goes on.
 
 use super::client::Client;
 use super::daemon::{Daemon, eventually};

@@ -105,7 +105,7 @@ fn killed_and_started_again_it_goes_on_where_it_was_and_says_so() {
     process.signal("TERM");
     assert_eq!(process.exit(), Some(0));
     let (process, mut sender, mut watcher) = started(&path, &["--on-gap", "reset"]);
-    // Other settings than when it was saved: it can not go on exactly.
+    // Other settings than when it was saved: it cannot go on exactly.
     let first = through(&mut sender, &mut watcher, 2600..2601);
     assert_eq!(first["q"], last["q"]);
     assert_eq!(first["reset"], 2);

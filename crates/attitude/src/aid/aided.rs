@@ -22,7 +22,7 @@ pub enum Start {
     /// The mean specific force at the first sample (m/s^2), by which it is levelled: a single one may be of
     /// a body that shakes. After a reset it is levelled by the first that comes.
     LevelBy(In<Body>),
-    /// That of the propagator's settings.
+    /// Attitude of the propagator's settings.
     Known {
         /// Standard deviation of its tilt, rad.
         tilt: f64,

@@ -3,7 +3,7 @@
 //! Apart from the filter because a magnetometer, and an accelerometer in messages of its own, are slower or
 //! faster than the gyro, come late, or run on another clock; the filter is to see what fits and nothing else.
 
-use super::memory::LARGEST;
+use super::bounds::LARGEST;
 use crate::frames::Body;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::Nanos;

@@ -40,7 +40,7 @@ const COLUMNS: [&[usize]; MOVING] = [
 const BY_GYRO: [usize; 9] = [7, 8, 9, 10, 11, 12, 13, 14, 15];
 /// States that a measurement may be kept from.
 const WITHHELD: [usize; 4] = [HEADING, BIAS, BIAS + 1, BIAS + 2];
-/// So many numbers of a row are summed up at once.
+/// Number of elements of a row that are summed up at once.
 const LANES: usize = 8;
 
 /// Rows of the transition from one update to the next that are not those of the identity, less those of it. Only the
@@ -207,7 +207,8 @@ impl Covariance {
     }
 
     /// The same, but that of what it says of heading and of the bias along a unit vector (body axes) a share is taken
-    /// back, 0 none and 1 all: the partial update of Schmidt's filter. The covariance is at least that of the gain used.
+    /// back, 0 none and 1 all: the partial update of Schmidt's filter. The covariance is at least that of the gain
+    /// used.
     pub(super) fn measure_withholding(
         &mut self,
         h: &[(usize, f64)],
@@ -286,7 +287,7 @@ impl Covariance {
         let within = |i: usize, j: usize| {
             self.rows[i][j].powi(2) <= self.rows[i][i] * self.rows[j][j] * (1.0 + 1e-9)
         };
-        let is_small = |i: usize| self.rows[i][i] <= super::memory::LARGEST;
+        let is_small = |i: usize| self.rows[i][i] <= super::bounds::LARGEST;
         self.is_sound()
             && (0..self.states).all(is_small)
             && (0..self.states).all(|i| (0..i).all(|j| within(i, j)))

@@ -285,8 +285,8 @@ impl Filter {
         self.known
     }
 
-    /// Whether nothing has told the gyro's bias about the vertical: the body has turned about its vertical axis only and
-    /// has not rested, so that its sigma is most of what it was at the start, and heading drifts by it.
+    /// Whether nothing has told the gyro's bias about the vertical: the body has turned about its vertical axis only
+    /// and has not rested, so that its sigma is most of what it was at the start, and heading drifts by it.
     #[must_use]
     pub fn is_bias_unobserved(&self) -> bool {
         let (main, withheld) = self.vertical.withheld();

@@ -1,7 +1,7 @@
 //! Samples since the last correction -> sums. Pure.
 
+use super::bounds::LARGEST;
 use super::calibration::Applied;
-use super::memory::LARGEST;
 use nalgebra::{Matrix3, Vector3};
 
 /// Sums between two corrections. Earth axes but for `rate`.

@@ -4,6 +4,7 @@
 
 use super::aided::{Aided, Given};
 use super::beside::Beside;
+use super::bounds::LARGEST;
 use super::calibration::{Applied, Calibration};
 use super::covariance::Covariance;
 use super::filter::{Filter, Report};
@@ -25,10 +26,8 @@ const BIAS: f64 = 10.0;
 const SCALE: f64 = 0.5;
 const FORCE_BIAS: f64 = 100.0;
 const LEAD: f64 = 1.0;
-/// No sum over an interval between corrections, speed, place or field is larger.
-pub(super) const LARGEST: f64 = 1e9;
 
-/// What an [`Aided`] knows at one moment; [`Aided::recall`] puts another there. Of a method without latency
+/// State of an [`Aided`] at one moment; [`Aided::recall`] restores it. Of a method without latency
 /// some 8 kB of text, 4 more at rest.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(

@@ -7,7 +7,7 @@
 //! `T`: a body that walks, runs or is shaken passes after a second or a few, and no length of a single sample
 //! has to be gravity's.
 
-use super::memory::LARGEST;
+use super::bounds::LARGEST;
 use nalgebra::Vector3;
 
 /// First and last time at which it is judged, s.

@@ -1,6 +1,6 @@
 //! Residuals of the specific force, one after another -> the variance of the next. Pure.
 
-use super::memory::LARGEST;
+use super::bounds::LARGEST;
 use super::settings::Settings;
 
 /// Statistics of residuals.

@@ -1,6 +1,6 @@
 //! Rate and force -> whether the sensor is at rest, and what its gyro reads there. Pure.
 
-use super::memory::LARGEST;
+use super::bounds::LARGEST;
 use super::settings::Settings;
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -151,8 +151,8 @@ impl Rest {
         })
     }
 
-    /// Whether the rate changes from one half of the spell to the other, or scatters more than neighbours do: a slow turn
-    /// that sets in or ends, a swell, and no bias. Neighbours tell the noise, which a slow change is not in.
+    /// Whether the rate changes from one half of the spell to the other, or scatters more than neighbours do: a slow
+    /// turn that sets in or ends, a swell, and no bias. Neighbours tell the noise, which a slow change is not in.
     fn changes(&self, scatter: &Vector3<f64>) -> bool {
         let half = self.open.len() / 2;
         let sum = |from: usize| {

@@ -75,13 +75,13 @@ pub struct Settings {
     pub rest_rate: f64,
     /// Whether the mean rate at rest is judged beside the bias known by then.
     pub rest_beside_bias: bool,
-    /// Whether all that was measured since the body became quiet tells the bias, with the noise it shows: else only what
-    /// is measured from then on that rest is certain, with [`rest_noise`](Settings::rest_noise).
+    /// Whether all that was measured since the body became quiet tells the bias, with the noise it shows: else only
+    /// what is measured from then on that rest is certain, with [`rest_noise`](Settings::rest_noise).
     pub rest_by_spell: bool,
     /// Least white noise of the rate at rest, rad/s/sqrt(Hz). Not below Earth's rate.
     pub rest_noise: f64,
-    /// Mean square of the sine of the inclination from the body's main vertical at which half is believed of what gravity
-    /// says of heading and of the gyro's bias along it; 0: all is, whatever the inclination.
+    /// Mean square of the sine of the inclination from the body's main vertical at which half is believed of what
+    /// gravity says of heading and of the gyro's bias along it; 0: all is, whatever the inclination.
     pub lean_believed: f64,
     /// Local gravity, m/s^2.
     pub gravity: f64,

@@ -1,6 +1,6 @@
 //! The magnetic fields that were met, and which of them headings are believed in. Pure.
 
-use super::memory::LARGEST;
+use super::bounds::LARGEST;
 use super::settings::Settings;
 
 /// Norm and dip of a field.

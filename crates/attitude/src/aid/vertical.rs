@@ -1,8 +1,8 @@
-//! Where the vertical has been in the body -> how much gravity can say of the gyro's bias along it. Pure.
+//! Path of the vertical in the body -> how much gravity can tell of the gyro's bias along it. Pure.
 //!
 //! While one axis of the body stays vertical, gravity says nothing of the bias about that axis; a linearised filter
-//! learns it all the same, because the estimate's inclination wanders. So the bias along the main vertical is considered
-//! and not estimated, the more so the less the body has leaned: the partial update of Schmidt's filter.
+//! learns it all the same, because the estimate's inclination wanders. So the bias along the main vertical is
+//! considered and not estimated, the more so the less the body has leaned: the partial update of Schmidt's filter.
 
 use nalgebra::{Matrix3, Vector3};
 

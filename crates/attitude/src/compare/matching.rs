@@ -15,7 +15,7 @@ const LONGEST_BRIDGE: i64 = 4;
 /// A track in time order, attitudes only.
 pub(super) struct Track<'a> {
     pub(super) rows: Cow<'a, [Stamped]>,
-    /// How many rows were no attitude.
+    /// Number of rows that were no attitude.
     pub(super) bad: usize,
     /// Median distance of successive distinct stamps, in nanoseconds; 0 when there are none.
     pub(super) spacing: i64,

@@ -48,7 +48,7 @@ impl Clock {
     }
 }
 
-/// Why the clock asked for can not be used, or why no clock can.
+/// Why the clock asked for cannot be used, or why no clock can.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClockWarning {
     /// The messages carry no such stamp.

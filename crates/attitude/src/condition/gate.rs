@@ -85,7 +85,7 @@ impl Gate {
         }
     }
 
-    /// The sample in SI and body axes, or why it can not be used. `spacing` is the ordinary step,
+    /// The sample in SI and body axes, or why it cannot be used. `spacing` is the ordinary step,
     /// needed only to see whether a delta angle without its own interval is saturated.
     #[inline(always)]
     pub(super) fn pass(

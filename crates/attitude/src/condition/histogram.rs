@@ -28,7 +28,7 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Without a value.
+    /// Makes an empty one.
     #[must_use]
     pub fn new() -> Self {
         Histogram {

@@ -13,10 +13,10 @@ use nalgebra::Vector3;
 /// Most samples that wait for what follows them.
 const MOST_WAITING: usize = 16;
 
-/// No value of a sample is larger, whatever its unit.
+/// Largest value of a sample, whatever its unit.
 const LARGEST: f64 = 1e9;
 
-/// What a conditioner knows at one moment; [`Conditioner::recall`] puts another there.
+/// State of a conditioner at one moment; [`Conditioner::recall`] restores it.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(
     feature = "serde",

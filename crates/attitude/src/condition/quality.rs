@@ -23,7 +23,8 @@ const PRIMING: usize = 64;
 /// Length of the windows in which the quietest is looked for, and fewest samples in one.
 const WINDOW_NANOS: i64 = 500_000_000;
 const WINDOW_SAMPLES: u64 = 8;
-/// A step longer than an hour, nanoseconds, is a clock that was set, or another recording: no samples are missing in it.
+/// A step longer than an hour, nanoseconds, is a clock that was set, or another recording: no samples are missing in
+/// it.
 pub const LONGEST_GAP_NANOS: i64 = 3_600_000_000_000;
 
 /// Streaming statistics of one topic, in the units and axes of the source. Bounded memory (about

@@ -35,7 +35,7 @@ use tracker::Tracker;
 const MOST_SEGMENTS: usize = 100_000;
 /// Segments reported one by one.
 const SEGMENTS_KEPT: usize = 1000;
-/// Jitter, as rms over the step, above which samples can not be counted by their stamps. A stamp is
+/// Jitter, as rms over the step, above which samples cannot be counted by their stamps. A stamp is
 /// believed within half a step of its instant, so that jitter of any size is measured as 0.29 at most
 /// (even over the step).
 const TOO_MUCH_JITTER: f64 = 0.25;
@@ -191,10 +191,10 @@ impl Lines {
     }
 }
 
-/// Why stamps can not be regularised.
+/// Why stamps cannot be regularised.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Uneven {
-    /// Stamps are so far off even instants that samples can not be counted by them.
+    /// Stamps are so far off even instants that samples cannot be counted by them.
     Jitter {
         /// rms over the step; never much above 0.29, because a stamp further off is not believed.
         jitter: f64,
@@ -227,7 +227,7 @@ impl From<&Uneven> for Diagnostic {
                 "the commonest step is a {steps:.0}th of the mean one, as where batches are stamped on arrival"
             ),
             Uneven::Restless { segments, samples } => format!(
-                "it changes, or samples can not be counted, {segments} times in {samples} samples"
+                "it changes, or samples cannot be counted, {segments} times in {samples} samples"
             ),
         };
         Diagnostic::new(format!("{REGULARISE_STAMPS}: there is no constant rate: {why}"))

@@ -40,7 +40,7 @@ pub struct Gaps {
     pub total_nanos: i64,
     /// The longest, nanoseconds.
     pub longest_nanos: i64,
-    /// By how much the clock jumped back, nanoseconds: all jumps together.
+    /// Sum of all jumps back of the clock, nanoseconds.
     pub back_nanos: i64,
     /// Nanoseconds in those that were not bridged, together and in the longest.
     pub not_bridged_nanos: (i64, i64),

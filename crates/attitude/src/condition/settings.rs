@@ -188,7 +188,7 @@ impl Settings {
         let BodyRate(bias) = self.bias;
         if !(bias.iter().all(|b| b.is_finite()) && bias.amax() <= super::gate::HUGE_RATE) {
             return fail(format!(
-                "{BIAS}: {:?} rad/s can not be a gyro bias",
+                "{BIAS}: {:?} rad/s cannot be a gyro bias",
                 bias.as_slice()
             ));
         }
@@ -239,7 +239,7 @@ impl Settings {
     }
 }
 
-/// A setting that can not be; the text names the flag.
+/// A setting that cannot be; the text names the flag.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SettingsError(pub(super) String);
 

@@ -161,7 +161,7 @@ impl Spacing {
     }
 
     fn set(&mut self, nominal: i64) {
-        // Clamped so that 64 excesses of an eighth each can not overflow.
+        // Clamped so that 64 excesses of an eighth each cannot overflow.
         let nominal = nominal.clamp(1, i64::MAX / 16);
         self.nominal = Some(nominal);
         self.tolerance = nominal / 8;

@@ -4,7 +4,7 @@
 //! decision that it is at rest must refuse when in doubt: a slow turn taken for a bias is worse
 //! than no bias.
 //!
-//! A body that turns slowly, steadily and about the vertical can not be told from a gyro bias by
+//! A body that turns slowly, steadily and about the vertical cannot be told from a gyro bias by
 //! an IMU; [`Limits::max_mean_rate`] is the only defence.
 
 mod estimate;

@@ -21,20 +21,20 @@ const IN_SI: std::ops::RangeInclusive<f64> = 4.0..=40.0;
 const FAR: f64 = 0.15;
 /// A mean shorter than this share of gravity is that of accelerations without it.
 const WITHOUT_GRAVITY: f64 = 0.5;
-/// Of an initial attitude that was given, or found at rest, rad.
+/// Sigma of an initial attitude that was given, or found at rest, rad.
 const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
 /// Time over which the mean force that levels is taken, and the least that tells one, s.
 const LEVELLED_SECS: f64 = 0.5;
 const LEAST_SECS: f64 = 0.2;
-/// Of a heading that was given where a field tells it too, rad.
+/// Sigma of a heading that was given while a field tells it too, rad.
 const HEADING_GIVEN: f64 = 0.5;
 
 /// Sensitivity of a bias to gravity, per 1 g along an axis, as a share of the turn-on bias: 0.1 deg/s
 /// of 1 (BMI088), 0.009 of 0.14 (ADIS16465), 1 deg/h of 10 (STIM300), by their data sheets.
 const BY_TILT: f64 = 0.1;
 
-/// Why gravity can not be used.
+/// Why gravity cannot be used.
 enum Unaided {
     /// Lack of a specific force.
     NoForce,
@@ -132,8 +132,8 @@ impl Aiding {
         }
     }
 
-    /// The same levelled by the mean force of the first half second instead of that of one sample, where it begins level
-    /// and these samples are known before the first attitude is wanted.
+    /// The same levelled by the mean force of the first half second instead of that of one sample, where it begins
+    /// level and these samples are known before the first attitude is wanted.
     pub(super) fn levelled_by_mean(mut self, resolved: &Meaning, first: &[RawSample]) -> Aiding {
         let is_level = self.start == Start::Level && self.forces == Forces::WithRates;
         if is_level && let Some((sum, secs)) = force_at_first(resolved, first, LEVELLED_SECS) {
@@ -229,11 +229,11 @@ impl Aiding {
     }
 }
 
-/// What a mean specific force of this length is, m/s^2, that is not gravity.
+/// Text of what a mean specific force of this length is, m/s^2, that is not gravity.
 fn no_gravity(length: f64) -> String {
     let share = length / STANDARD_GRAVITY;
     if share < WITHOUT_GRAVITY {
-        return "acceleration without gravity can not level".to_owned();
+        return "acceleration without gravity cannot level".to_owned();
     }
     let why = if (length * 1e-3 - 1.0).abs() <= FAR {
         "it looks like mg"
@@ -246,7 +246,8 @@ fn no_gravity(length: f64) -> String {
 }
 
 impl Aiding {
-    /// One standard deviation of what is left of a bias that was said, measured at rest or calibrated, rad/s, body axes.
+    /// One standard deviation of what is left of a bias that was said, measured at rest or calibrated, rad/s, body
+    /// axes.
     pub(super) fn stated_bias(&self, plan: &Plan) -> [Option<f64>; 3] {
         let left = (plan.bias != Bias::None).then_some(self.settings.bias_prior);
         match self.settings.prior.bias {
@@ -320,9 +321,10 @@ fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
     Some((sum.norm() / secs, secs))
 }
 
-/// Integral of the specific force over at most `longest` seconds in the body axes of the first sample, and over how many
-/// seconds: gravity and what the velocity changed by, however the body shakes and turns. By sums, which over a second is
-/// good enough.
+/// Integral of the specific force over at most `longest` seconds in the body axes of the first sample, and over how
+/// many
+/// seconds: gravity and what the velocity changed by, however the body shakes and turns. By sums, which over a second
+/// is good enough.
 fn force_at_first(
     resolved: &Meaning,
     first: &[RawSample],

@@ -112,7 +112,7 @@ impl Estimator {
     /// is what a daemon would have said.
     ///
     /// # Errors
-    /// In words, with the flag that helps: settings that can not be.
+    /// In words, with the flag that helps: settings that cannot be.
     pub fn new(
         plan: &Plan,
         resolved: &Meaning,

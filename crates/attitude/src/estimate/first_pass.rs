@@ -59,7 +59,7 @@ impl Conditioned {
         Ok(())
     }
 
-    /// What became of those that were conditioned so far.
+    /// Outcome of those that were conditioned so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
         let running = self.running.as_ref();

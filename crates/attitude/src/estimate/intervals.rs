@@ -60,7 +60,7 @@ impl Mismatch {
         })
     }
 
-    /// Why the samples can not be used as they are, with the flags that help; `read` is where the
+    /// Why the samples cannot be used as they are, with the flags that help; `read` is where the
     /// interval lies and the unit it was read in.
     pub(super) fn refusal(&self, read: Option<&(String, TimeUnit)>) -> Diagnostic {
         let (path, unit) = match read {

@@ -1,6 +1,6 @@
 //! Settings by which the samples of a run are understood and integrated. Pure.
 //!
-//! Apart from the stages because each of them takes its part of it, and because what can not be is refused
+//! Apart from the stages because each of them takes its part of it, and because what cannot be is refused
 //! here, before the data are looked at.
 
 use super::sensor_calibration::SensorCalibration;
@@ -244,7 +244,7 @@ impl Plan {
         if is_beside && matches!(self.clock, Clock::Index { .. }) {
             return Err(
                 Diagnostic::new(format!(
-                    "{TIME} index: samples without stamps can not be paired with a field, or a specific force of its own"
+                    "{TIME} index: samples without stamps cannot be paired with a field, or a specific force of its own"
                 ))
                 .help(format!(
                     "{TIME} header, log or publish"
@@ -531,7 +531,8 @@ impl Noise {
         }
     }
 
-    /// The same for an attitude that begins level by the accelerometer at a rest that tells the vertical to `scatter`, rad.
+    /// The same for an attitude that begins level by the accelerometer at a rest that tells the vertical to
+    /// `scatter`, rad.
     #[must_use]
     pub fn levelled(&self, scatter: f64) -> Noise {
         let tilt = self.tilt.hypot(scatter);

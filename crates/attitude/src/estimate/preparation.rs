@@ -1,7 +1,7 @@
 //! The first samples (or a pass over the log) -> clock, bias, initial attitude. Pure.
 //!
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
-//! seen, and what to say when it can not be known.
+//! seen, and what to say when it cannot be known.
 
 use super::aiding::Aiding;
 use super::first_pass::{FEW, RestPass};
@@ -24,7 +24,7 @@ use crate::setting::{
 use crate::worlds::{self, Convention, World};
 use nalgebra::Vector3;
 
-/// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
+/// Samples, and seconds of data, in which rest is sought when the log cannot be read twice.
 const MANY: usize = 200_000;
 const REST_SECS: f64 = 60.0;
 
@@ -425,7 +425,7 @@ fn decide_truncation(
         (_, None) => Err(match rates {
             None => {
                 Diagnostic::new(format!(
-                    "{UNDO_TRUNCATION} on: what can not be read twice does not show its step in time"
+                    "{UNDO_TRUNCATION} on: what cannot be read twice does not show its step in time"
                 ))
                 .help(format!(
                     "on=STEP in rad/s, as `strapd replay` of a file says it, or a {CALIBRATION} with its truncation_step"
@@ -632,7 +632,7 @@ impl Earth {
     }
 }
 
-/// Why `--bias auto` with `--earth-rate` can not be.
+/// Why `--bias auto` with `--earth-rate` cannot be.
 fn not_at_start(why: &NoRest) -> Diagnostic {
     let why = Diagnostic::from(why);
     let why = why.what();
@@ -644,7 +644,7 @@ fn not_at_start(why: &NoRest) -> Diagnostic {
     ))
 }
 
-/// Why `--init gravity` can not be. The reasons are those of a bias, the ways out are not.
+/// Why `--init gravity` cannot be. The reasons are those of a bias, the ways out are not.
 fn not_level(why: &NoRest) -> Diagnostic {
     let said = Diagnostic::from(why).at(format_args!("{INIT} gravity"));
     match why {

@@ -45,7 +45,7 @@ pub(super) struct Told {
     pub(super) bias_sigma: f64,
     /// Range of the gyro, rad/s; 0: not known.
     pub(super) gyro_range: f64,
-    /// What is known of this one.
+    /// Prior knowledge of this sensor.
     pub(super) known: Beforehand,
 }
 
@@ -102,7 +102,7 @@ fn is_beyond(smoothed: &Smoothed, looseness: Looseness) -> bool {
     is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&force)
 }
 
-/// Without what the scales of all axes have in common, which is known of no accelerometer: each is then known to `own`.
+/// Removes what the scales of all axes share, which is known of no accelerometer: each is then known to `own`.
 fn own_scales(mut force: Learned<9>, own: f64) -> Learned<9> {
     const SCALES: [usize; 3] = [0, 4, 8];
     if SCALES.iter().all(|i| force.prior[*i] > own) {
@@ -310,7 +310,7 @@ impl Smoothing {
     /// Smooths it.
     ///
     /// # Errors
-    /// It can not be smoothed at all.
+    /// It cannot be smoothed at all.
     fn smooth(
         &mut self,
         threads: usize,

@@ -1,7 +1,7 @@
 //! `--regularise-stamps`: what becomes of the stamps of a run. Pure.
 //!
 //! Apart from the preparation because a recording needs a pass of its own for it, whatever else is
-//! known, and because a stream can not have one.
+//! known, and because a stream cannot have one.
 
 use super::first_pass::{Conditioned, FEW};
 use super::meaning::Meaning;

@@ -203,7 +203,7 @@ impl ImuError {
         })
     }
 
-    /// Checks every size, and what can not stand together.
+    /// Checks every size, and what cannot stand together.
     ///
     /// # Errors
     /// A size that is negative, not finite or beyond any sensor; a term that lacks another it needs.

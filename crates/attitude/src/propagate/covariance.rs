@@ -370,7 +370,7 @@ pub struct Carried {
 impl Carried {
     /// Whether a covariance can have been so: what a file says may be anything.
     pub(crate) fn is_plausible(&self) -> bool {
-        /// No variance, product or time is larger.
+        /// Largest variance, product or time.
         const LARGEST: f64 = 1e12;
         /// Rounding of a variance of nothing.
         const ROUNDING: f64 = 1e-12;
@@ -405,7 +405,7 @@ impl Covariance {
         }
     }
 
-    /// Goes on from what another of the same noise has carried; `false` when that can not be.
+    /// Goes on from what another of the same noise has carried; `false` when that cannot be.
     pub(crate) fn carry(&mut self, carried: &Carried) -> bool {
         if !carried.is_plausible() || carried.distorted.is_some() != self.is_distorted {
             return false;

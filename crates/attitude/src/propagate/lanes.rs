@@ -3,7 +3,7 @@
 //! Neighbouring intervals of a log go through identical operations, so the kernels are written
 //! once over `[f64; N]` and the compiler lays them on whatever vector registers there are.
 //! Each lane does exactly the operations N = 1 does, in the same order (Rust never contracts
-//! to fused multiply-add), so how intervals are grouped can not change a bit.
+//! to fused multiply-add), so how intervals are grouped cannot change a bit.
 
 use std::array::from_fn;
 use std::ops::{Add, Mul, Neg, Sub};

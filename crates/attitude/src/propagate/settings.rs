@@ -27,7 +27,7 @@ pub struct Settings {
     pub noise: Noise,
 }
 
-/// Settings that can not be.
+/// Settings that cannot be.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum SettingsError {
@@ -66,19 +66,19 @@ impl From<&SettingsError> for Diagnostic {
                 given,
                 smallest,
                 largest,
-            } => Diagnostic::new(format!("a window of {given} samples can not be used"))
+            } => Diagnostic::new(format!("a window of {given} samples cannot be used"))
                 .help(format!("{WINDOW} takes {smallest} to {largest}")),
             SettingsError::Initial { wxyz } => Diagnostic::new(format!(
                 "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion"
             ))
             .help(format!("{INIT} q=w,x,y,z with norm 1")),
             SettingsError::WorldRate { rate } => {
-                Diagnostic::new(format!("the world can not turn at {rate:?} rad/s")).help(format!(
+                Diagnostic::new(format!("the world cannot turn at {rate:?} rad/s")).help(format!(
                     "{EARTH_RATE} takes a latitude in degrees, -90 to 90"
                 ))
             }
             SettingsError::Noise { name, value } => {
-                Diagnostic::new(format!("noise {name} = {value} can not be"))
+                Diagnostic::new(format!("noise {name} = {value} cannot be"))
                     .help(format!("{NOISE} takes numbers from 0 up, in SI units"))
             }
         }

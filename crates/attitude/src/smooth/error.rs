@@ -15,7 +15,7 @@ pub enum SmoothError<E> {
         /// Number without a force.
         forceless: u64,
     },
-    /// A setting can not be.
+    /// A setting cannot be.
     Setting {
         /// Name of the setting.
         name: &'static str,
@@ -33,7 +33,7 @@ impl<E: fmt::Display> From<&SmoothError<E>> for Diagnostic {
             ))
             .help("a smoother needs the accelerometer: without it, integrate the gyro alone"),
             SmoothError::Setting { name, value } => {
-                Diagnostic::new(format!("{name} = {value} can not be"))
+                Diagnostic::new(format!("{name} = {value} cannot be"))
             }
         }
     }

@@ -113,7 +113,7 @@ pub(super) fn turn_north(
         .collect()
 }
 
-/// A mean that half of the values can not carry away.
+/// A mean that half of the values cannot carry away.
 fn robust_mean(found: &[(Vector3<f64>, f64)]) -> Option<Vector3<f64>> {
     if found.is_empty() {
         return None;

@@ -1,7 +1,9 @@
 //! Attitudes -> the axis of the body that stays vertical, and what is known of the gyro's bias along it. Pure.
 //!
-//! A stage of its own because the equations believe too much there. While an axis of the body stays upright gravity says
-//! nothing of the bias along it; equations that are linear about attitudes off by degrees, and a motion that is taken to
+//! A stage of its own because the equations believe too much there. While an axis of the body stays upright gravity
+//! says
+//! nothing of the bias along it; equations that are linear about attitudes off by degrees, and a motion that is taken
+//! to
 //! come back, say all the same that they know it to hundredths of a degree a second. So it is held at what rests, the
 //! real-time filter at a rest, or the leaning of the body tell, and what that is not known to is added to sigma.
 
@@ -16,12 +18,13 @@ use nalgebra::{Matrix3, Vector3};
 
 /// An axis is upright where the mean square of the inclination's sine from it is below this.
 const UPRIGHT: f64 = 0.06;
-/// How well the first node's bias along it is held, and how well it is known where the equations are asked for it, rad/s.
+/// Sigma by which the first node's bias along it is held, and by which it is known where the equations are asked for
+/// it, rad/s.
 const HELD: f64 = 1e-6;
 const FREE: f64 = 0.1;
 /// Rests tell a bias to no less than this share of what it is in the sensor's class.
 const LEAST: f64 = 0.01;
-/// What is wrong with a bias that only the leaning tells, times the sine of the inclination, rad/s.
+/// Error of a bias that only the leaning tells, times the sine of the inclination, rad/s.
 const BY_LEANING: f64 = 0.1_f64.to_radians();
 /// The real-time filter has seen a rest if it knows the bias to this, rad/s.
 const RESTED: f64 = 0.1_f64.to_radians();
@@ -36,7 +39,7 @@ pub(super) struct Main {
     rho: f64,
 }
 
-/// What the first node's bias along an axis is taken for.
+/// Prior of the first node's bias along an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Along {
     axis: Vector3<f64>,
@@ -45,7 +48,7 @@ pub(super) struct Along {
 }
 
 impl Along {
-    /// In place of what weights and centre say of this axis.
+    /// Replaces what weights and centre state of this axis.
     pub(super) fn put_in(
         &self,
         weights: &Matrix3<f64>,
@@ -74,7 +77,7 @@ pub struct Held {
 }
 
 impl Main {
-    /// Of attitudes at the nodes; `None` where no axis stays upright.
+    /// Main axis by attitudes at the nodes; `None` where no axis stays upright.
     pub(super) fn of(segments: &[Segment], nodes: &[[f64; 4]]) -> Option<Main> {
         let (mut sum, mut mean, mut secs) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
         for (k, segment) in segments.iter().enumerate().filter(|(_, s)| !s.is_break) {
@@ -111,7 +114,8 @@ impl Main {
         self.axis.component_mul(axes).norm()
     }
 
-    /// The bias along it that was seen to be `rate` with a variance of `seen`, where it was nothing with that of `prior`.
+    /// The bias along it that was seen to be `rate` with a variance of `seen`, where it was nothing with that of
+    /// `prior`.
     fn held(&self, rate: f64, seen: f64, prior: f64, is_by_rest: bool) -> Held {
         let share = prior / (prior + seen);
         Held {
@@ -122,7 +126,7 @@ impl Main {
         }
     }
 
-    /// By rests; `None` without any. `known`: sigmas of the bias beforehand, `class`: that of the sensor's class.
+    /// Bias by rests; `None` without any. `known`: sigmas of the bias beforehand, `class`: that of the sensor's class.
     pub(super) fn by_rests(&self, rests: &[Run], known: &Vector3<f64>, class: f64) -> Option<Held> {
         let mut rates: Vec<f64> = rests.iter().map(|run| self.axis.dot(&run.rate)).collect();
         if rates.is_empty() {
@@ -135,8 +139,8 @@ impl Main {
         Some(self.held(rate, seen, self.sigma(known).powi(2), true))
     }
 
-    /// By a solution in which it was free, where there is one, and the filter. `known`: sigmas of the bias beforehand,
-    /// about nothing.
+    /// Bias by a solution in which it was free, if there is one, and the filter. `known`: sigmas of the bias
+    /// beforehand, about nothing.
     pub(super) fn by_motion(
         &self,
         segments: &[Segment],
@@ -164,7 +168,7 @@ impl Main {
         by_filter.filter(is_known).unwrap_or(by_leaning)
     }
 
-    /// By attitudes that are solved: those of the start lean by what is wrong with them.
+    /// Main axis by attitudes that are solved: those of the start lean by what is wrong with them.
     fn anew(&self, segments: &[Segment], nodes: &[Node]) -> Main {
         let attitudes: Vec<[f64; 4]> = nodes.iter().map(|node| node.q).collect();
         Main::of(segments, &attitudes).unwrap_or(*self)
@@ -202,7 +206,7 @@ impl Held {
         bias + self.axis * (self.rate - self.axis.dot(bias))
     }
 
-    /// What the first node's bias is held at.
+    /// Value at which the first node's bias is held.
     pub(super) fn along(&self) -> Along {
         Along {
             axis: self.axis,
@@ -211,7 +215,8 @@ impl Held {
         }
     }
 
-    /// Where a solution goes on from with this bias: the tilt that it had, and the heading that the gyro gives then.
+    /// Start from which a solution goes on with this bias: the tilt that it had, and the heading that the gyro gives
+    /// then.
     pub(super) fn begun(
         &self,
         segments: &[Segment],

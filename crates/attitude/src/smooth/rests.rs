@@ -12,7 +12,7 @@ use std::ops::Range;
 const LONGEST_JUDGED: f64 = 20.0;
 /// Rates of one bias differ by no more than this and three of their sigmas, rad/s.
 const SAME: f64 = 0.002;
-/// Where all rests together are shorter than this, s, the short ones are judged more strictly.
+/// Total length of all rests, s, below which the short ones are judged more strictly.
 const FEW_SECS: f64 = 10.0;
 /// And these are the short ones, s.
 const SHORT_SECS: f64 = 1.4;
@@ -151,8 +151,8 @@ pub(super) fn rate_of(segments: &[Segment], quiet: &[bool]) -> Option<Vector3<f6
     })
 }
 
-/// Leaves of the still segments those that rest. `bias_sigma`: of the gyro's bias in the sensor's class. The gyro's bias by
-/// them, rad/s, where there are any.
+/// Leaves of the still segments those that rest. `bias_sigma`: of the gyro's bias in the sensor's class. The gyro's
+/// bias by them, rad/s, where there are any.
 pub(super) fn keep_rests(segments: &mut [Segment], bias_sigma: f64) -> Option<Vector3<f64>> {
     let (mut kept, mut dropped): (Vec<Run>, Vec<Run>) =
         rests(segments).into_iter().partition(|run| {

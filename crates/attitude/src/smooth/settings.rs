@@ -6,7 +6,7 @@ use std::num::NonZero;
 /// Standard deviation of the gyro's bias in the default class, rad/s.
 pub(crate) const BIAS_SIGMA: f64 = 1.0_f64.to_radians();
 
-/// What a gyro value is the rate of.
+/// Model of a gyro value: the rate that it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum SampleModel {
     /// The mean over the interval that ends at its stamp: also a delta angle, divided by that interval.
@@ -51,9 +51,9 @@ pub enum FieldUnit {
 /// what is left, body axes, matrices row by row. `None`: as of any sensor.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Beforehand {
-    /// Of the gyro's bias, rad/s.
+    /// Sigma of the gyro's bias, rad/s.
     pub gyro_bias: [Option<f64>; 3],
-    /// Of the gyro's scale and axes.
+    /// Sigmas of the gyro's scale and axes.
     pub gyro: [Option<f64>; 9],
     /// Sigma of the accelerometer's bias, m/s^2.
     pub force_bias: [Option<f64>; 3],
@@ -124,7 +124,7 @@ pub struct Settings {
     pub bias_sigma: f64,
     /// Range of the gyro, rad/s: a rate at it may be any beyond. 0: not known.
     pub gyro_range: f64,
-    /// By how much the sigmas of calibration constants are larger than after a calibration in the factory.
+    /// Ratio of the sigmas of calibration constants to those after a calibration in the factory.
     pub looseness: Looseness,
     /// Prior knowledge of this sensor.
     pub known: Beforehand,

@@ -63,14 +63,14 @@ impl Smoothed {
         self.bound
     }
 
-    /// The bias that was held, where motion does not tell it: one axis of the body stays vertical, and no field tells the
-    /// heading.
+    /// The bias that was held, where motion does not tell it: one axis of the body stays vertical, and no field tells
+    /// the heading.
     #[must_use]
     pub fn held(&self) -> Option<Held> {
         self.held
     }
 
-    /// What became of the samples.
+    /// Counts of the samples.
     #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts

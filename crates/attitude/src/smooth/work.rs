@@ -34,7 +34,7 @@ const RESTS: usize = 10;
 /// Smooths a recording.
 ///
 /// # Errors
-/// [`SmoothError`]: samples that can not be read, or are too few. A recording that the smoother can not make sense of
+/// [`SmoothError`]: samples that cannot be read, or are too few. A recording that the smoother cannot make sense of
 /// is none: see [`Smoothed::outcome`].
 pub fn smooth<S: Samples>(
     samples: &mut S,
@@ -272,8 +272,8 @@ impl Work {
         }
     }
 
-    /// The phase with the field, where there is one. Where it leads nowhere so do the attitudes without it: what is solved
-    /// without a north is turned by one wherever the gyro has brought it.
+    /// The phase with the field, where there is one. Where it leads nowhere so do the attitudes without it: what is
+    /// solved without a north is turned by one wherever the gyro has brought it.
     fn with_field<S: Samples>(
         &self,
         samples: &mut S,

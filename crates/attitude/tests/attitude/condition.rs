@@ -57,7 +57,7 @@ fn spoil(rng: &mut ChaCha8Rng, reach: usize) -> (Vec<RawSample>, Injected) {
     let mut injected = Injected::default();
     let mut kept = Vec::new();
     for n in 0..2000 {
-        // The first and the last are kept: a loss there can not be seen by anyone.
+        // The first and the last are kept: a loss there cannot be seen by anyone.
         if n > 0 && n < 1999 && rng.random_bool(0.1) {
             injected.dropped += 1;
         } else {

@@ -153,7 +153,7 @@ pub(super) fn physical(
     let tensor = symmetric(inertia_cg, allowed)?;
     let moments = principal_moments(&tensor);
     let [a, b, c] = moments;
-    // Zero to rounding is zero: a rod without thickness can not be spun up about itself.
+    // Zero to rounding is zero: a rod without thickness cannot be spun up about itself.
     if a.is_nan() || a <= allowed * 1e-3 {
         return Err(InertiaError::NotPositive { moments });
     }

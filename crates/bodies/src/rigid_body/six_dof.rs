@@ -38,7 +38,7 @@ impl Vessel {
     /// A body in vacuum, or with the added mass of the fluid round it.
     ///
     /// # Errors
-    /// [`InertiaError::NotInvertible`] when the mass matrix can not be factored.
+    /// [`InertiaError::NotInvertible`] when the mass matrix cannot be factored.
     pub fn new(body: RigidBody, added: Option<AddedMass>) -> Result<Self, InertiaError> {
         let total = added.map_or(body.mass_matrix(), |a| body.mass_matrix() + a.matrix());
         let factored = Cholesky::new(total).ok_or(InertiaError::NotInvertible)?;

@@ -62,7 +62,7 @@ impl Case {
     ///
     /// # Errors
     /// [`TopError::OutOfRange`] for numbers that are not; [`TopError::NoSteadyPrecession`] where the
-    /// case is defined by a precession the spin can not hold.
+    /// case is defined by a precession the spin cannot hold.
     pub fn start(self, top: &SymmetricTop, tilt: f64, w3: f64) -> Result<EulerState, TopError> {
         for (what, value) in [("tilt", tilt), ("spin", w3)] {
             if !value.is_finite() {
@@ -85,7 +85,7 @@ impl Case {
             Self::SteadySlow => state.precession_rate = slow()?,
             Self::SteadyFast => {
                 let (_, fast) = top.steady_precession(tilt, w3)?;
-                // At 90 degrees the fast root has gone to infinity; rates a gyro can not read are
+                // At 90 degrees the fast root has gone to infinity; rates a gyro cannot read are
                 // no motion to simulate.
                 let readable = fast.abs() <= 1e4;
                 if !readable {

@@ -51,7 +51,7 @@ pub enum TopError {
 impl fmt::Display for TopError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::OutOfRange { what, value } => write!(f, "{what} can not be {value}"),
+            Self::OutOfRange { what, value } => write!(f, "{what} cannot be {value}"),
             Self::NotATop { defect } => write!(
                 f,
                 "not a symmetric top: its axis must be z through the origin, and is off by {defect:e}"

@@ -103,7 +103,7 @@ impl Course {
     /// Checked.
     ///
     /// # Errors
-    /// Numbers that can not be, with the bounds.
+    /// Numbers that cannot be, with the bounds.
     pub fn new(
         top: SymmetricTop,
         start: EulerState,
@@ -355,7 +355,7 @@ pub fn case(name: &str) -> std::result::Result<Case, String> {
 /// A top some arrangement of matter can be.
 ///
 /// # Errors
-/// What can not be, with its numbers.
+/// What cannot be, with its numbers.
 pub fn body(
     mass: f64,
     arm: f64,

@@ -1,4 +1,4 @@
-//! Why the arm can not: what, where, by how much. Pure.
+//! Why the arm cannot: what, where, by how much. Pure.
 
 use super::Singularity;
 use crate::inertia::InertiaError;
@@ -52,7 +52,7 @@ pub enum ArmError {
     },
     /// The target's rotation is none.
     NotARotation(NotARotation),
-    /// Five joints can not take this pose: it is off every plane through the base axis.
+    /// Five joints cannot take this pose: it is off every plane through the base axis.
     OutOfPlane {
         /// Distance of the tool point from the plane, m, signed.
         position: f64,
@@ -78,7 +78,7 @@ pub enum ArmError {
     },
     /// Joint rates are not determined here.
     Singular(Singularity),
-    /// A velocity of the gripper that five joints can not make.
+    /// A velocity of the gripper that five joints cannot make.
     InfeasibleTwist {
         /// Left over: the component along the one direction the arm lacks, m/s and rad/s mixed.
         defect: f64,
@@ -176,7 +176,7 @@ impl fmt::Display for ArmError {
             Self::Singular(which) => write!(f, "singular: {which}"),
             Self::InfeasibleTwist { defect, allowed } => write!(
                 f,
-                "five joints can not make this velocity: {defect:.3e} of it is along the direction the arm \
+                "five joints cannot make this velocity: {defect:.3e} of it is along the direction the arm \
                  lacks, allowed {allowed:.0e}"
             ),
             Self::Path { secs, why } => write!(f, "at {secs:.6} s of the path: {why}"),

@@ -44,7 +44,7 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// Starts near `start` (which decides the branch). `policy` for poses that five joints can not take;
+    /// Starts near `start` (which decides the branch). `policy` for poses that five joints cannot take;
     /// `allowed`: how much of a velocity may be along the direction they lack (m/s and rad/s mixed).
     ///
     /// # Errors

@@ -175,7 +175,7 @@ impl Solutions {
 }
 
 impl Arm {
-    /// Every joint vector, up to four, that takes the gripper to `target`; where five joints can not,
+    /// Every joint vector, up to four, that takes the gripper to `target`; where five joints cannot,
     /// to the pose the policy names. `q_current` decides joint 1 where it is free.
     ///
     /// # Errors

@@ -102,7 +102,7 @@ impl Arm {
         [self.sine_of_elbow(&k).abs(), k.tool[0].hypot(k.pitch.0)]
     }
 
-    /// The unit vector `[v; w]` the arm can not move along (left null vector of J).
+    /// The unit vector `[v; w]` the arm cannot move along (left null vector of J).
     ///
     /// # Errors
     /// [`ArmError::Singular`] where the base axis is met with vertical approach: more than one is lost.

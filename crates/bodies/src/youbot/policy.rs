@@ -1,4 +1,4 @@
-//! A pose five joints can not take -> which nearby pose is meant. Pure.
+//! A pose five joints cannot take -> which nearby pose is meant. Pure.
 
 /// Part to keep of a target that is off every plane through the base axis. The residual is always
 /// returned; poses in a plane are the same under every policy.

@@ -91,7 +91,7 @@ pub struct FieldPath {
     pub(crate) unit: Option<TimeUnit>,
 }
 
-/// A `--field` that can not be read.
+/// A `--field` that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{} {text}: {why}", FIELD)]
 pub struct BadFieldPath {

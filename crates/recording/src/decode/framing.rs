@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(seen, 19);
         framer.feed(&[0], &mut |_| true);
         assert_eq!((framer.partial.capacity(), framer.ended()), (0, 20));
-        // One that can not be is given up without waiting for anything.
+        // One that cannot be is given up without waiting for anything.
         framer.feed(b"\xf8\x01\x07\0", &mut |framed| {
             framed == Framed::Broken(21)
         });

@@ -6,7 +6,7 @@
 use crate::text::{printable, snippet};
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// A channel this crate can not decode: named, explained, with the flag that helps.
+/// A channel this crate cannot decode: named, explained, with the flag that helps.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unsupported {
     /// Topic of the channel, control characters escaped.
@@ -25,7 +25,7 @@ pub struct Unsupported {
 pub(super) const UNDEFINED: &str =
     "its schema text is empty, and the type is none of the well-known ones";
 
-/// What helps where a recording holds no definition of `kind`.
+/// Help for a recording that holds no definition of `kind`.
 pub(crate) fn defining(kind: &str) -> String {
     let package = kind.split('/').next().unwrap_or_default();
     format!(

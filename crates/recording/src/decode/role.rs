@@ -1,7 +1,7 @@
 //! Choice of "the IMU topic" among channels. Pure.
 //!
 //! Apart from decoding because it is asked of every channel of a log before one is chosen, and must
-//! answer for those it can not decode as well.
+//! answer for those it cannot decode as well.
 
 use super::schema::last_name;
 use super::select::Found;
@@ -44,7 +44,7 @@ impl Role {
 }
 
 /// Role of `channel`. JSON without a schema shows it only in a message: pass its first one.
-/// A channel that can not be decoded serves as nothing.
+/// A channel that cannot be decoded serves as nothing.
 #[must_use]
 pub fn role(channel: &Channel<'_>, first: Option<(&[u8], Nanos)>) -> Role {
     let decoder = Decoder::compile(channel, &Options::default());

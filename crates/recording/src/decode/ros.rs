@@ -65,7 +65,7 @@ enum Op {
     Loop {
         count: Option<u32>,
         body: u32,
-        /// Fewest bytes of one turn, at least 1: a count the payload can not hold ends the walk.
+        /// Fewest bytes of one turn, at least 1: a count the payload cannot hold ends the walk.
         min: usize,
         emit: Emit,
         name: u32,

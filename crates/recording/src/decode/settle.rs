@@ -16,13 +16,13 @@ use strapd_attitude::setting::FIELD;
 
 impl Decoder {
     /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
-    /// that is a bare number, by the recorder's clock and else by its magnitude (until [`Decoder::settle_unit`] has seen
-    /// more), and for JSON what the messages hold. Without this call such stamps are read by magnitude,
+    /// that is a bare number, by the recorder's clock and else by its magnitude (until [`Decoder::settle_unit`] has
+    /// seen more), and for JSON what the messages hold. Without this call such stamps are read by magnitude,
     /// one by one.
     ///
     /// # Errors
     /// [`Unsupported`] when a JSON message lacks a `--field` path, or holds neither body rate nor
-    /// orientation; it lists the keys there are. A message that can not be decoded is no error here.
+    /// orientation; it lists the keys there are. A message that cannot be decoded is no error here.
     pub fn settle(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
         if let Plan::Json(_) = &self.plan {
             return self.settle_json(payload, log);

@@ -1,7 +1,7 @@
 //! The first lines of a table -> what its columns hold. Pure.
 //!
 //! Apart from the rows because here, once, it is decided and said what numbers mean: nothing of it is guessed in
-//! silence, and what can not be told ends with the flag that tells it.
+//! silence, and what cannot be told ends with the flag that tells it.
 
 mod increments;
 mod instants;
@@ -148,7 +148,7 @@ pub(crate) struct Opening {
     stem: String,
     wanted: Wanted,
     lines: Vec<Vec<u8>>,
-    /// How often a line followed itself, by its place.
+    /// Number of times that a line followed itself, by its place.
     repeated: BTreeMap<usize, u64>,
     bytes: usize,
     found: Option<Found>,
@@ -264,7 +264,7 @@ impl Opening {
     /// The table, and its rows so far with the numbers of their lines, from 1.
     ///
     /// # Errors
-    /// What is missing or can not be told, in words with their help.
+    /// What is missing or cannot be told, in words with their help.
     pub(crate) fn finish(self) -> Result<(Table, Vec<Held>), Diagnostic> {
         let Some(found) = self.found else {
             return Err(self.nothing());
@@ -480,7 +480,7 @@ fn check_lengths(
     let what = format!("its rows have {} cells under {need} names", first.len());
     Err(match delimiter {
         Delimiter::Byte(b',') if first.len() + 2 > need * 2 => Diagnostic::new(format!(
-            "{what}: decimal commas, and commas between the cells? What belongs together can not be told"
+            "{what}: decimal commas, and commas between the cells? What belongs together cannot be told"
         ))
         .help("export it with semicolons or tabs between the cells, or with decimal points"),
         _ => Diagnostic::new(what)

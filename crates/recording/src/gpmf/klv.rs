@@ -28,7 +28,7 @@ pub(crate) fn next_device(data: &[u8]) -> Option<usize> {
     memchr::memmem::find(data, &super::MAGIC)
 }
 
-/// Items one after the other; what can not be one ends them, and stays.
+/// Items one after the other; what cannot be one ends them, and stays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Items<'a>(pub(super) &'a [u8]);
 

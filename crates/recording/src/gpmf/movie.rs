@@ -18,7 +18,7 @@ const CALENDAR: std::ops::Range<u64> = 946_684_800..4_102_444_800;
 /// Finds the index of a video, wherever it lies. `read` fills a slice from an offset, less only at the end.
 ///
 /// # Errors
-/// The input can not be read; else why there is none, in words.
+/// The input cannot be read; else why there is none, in words.
 pub(crate) fn index(
     size: u64,
     read: &mut dyn FnMut(u64, &mut [u8]) -> io::Result<usize>,
@@ -104,7 +104,7 @@ fn table(bytes: &[u8], at: usize, each: usize) -> Vec<u32> {
     words.take(count.saturating_mul(each)).collect()
 }
 
-/// How long a payload lasts by its track, ns.
+/// Duration of a payload by its track, ns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Lasts {
     /// The track says it of this one.

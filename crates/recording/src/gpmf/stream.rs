@@ -4,7 +4,7 @@
 
 use super::klv::{Item, Items};
 
-/// What was measured.
+/// Quantity that was measured.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum What {
     /// rad/s.
@@ -35,7 +35,7 @@ pub(super) struct Payload {
     pub(super) devices: Vec<(u32, String)>,
     /// The camera's clock at its beginning, ms.
     pub(super) tick: Option<u64>,
-    /// Streams of rates or forces that can not be read: why.
+    /// Streams of rates or forces that cannot be read: why.
     pub(super) refused: Vec<&'static str>,
     /// Bytes at its end that are none of it.
     pub(super) rest: usize,

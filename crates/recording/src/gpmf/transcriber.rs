@@ -22,7 +22,7 @@ pub(crate) struct Transcriber {
     channels: BTreeMap<u32, u16>,
     /// Samples that are not told yet, by channel.
     queues: BTreeMap<u16, Queue>,
-    /// What the payloads so far took by the beginnings of those that followed, ns, and their samples, by device and kind.
+    /// Time of the payloads so far by the beginnings of those that followed, ns, and their samples, by device and kind.
     so_far: BTreeMap<(u32, What), (u64, u64)>,
     /// A stamp of the camera's clock, us, and the time it stands for, ns.
     anchor: Option<(u64, u64)>,
@@ -35,7 +35,7 @@ pub(crate) struct Transcriber {
 
 #[derive(Debug)]
 struct Timed {
-    /// When it begins, ns, and how long it lasts by the track.
+    /// Beginning, ns, and duration by the track.
     at: u64,
     lasts: Lasts,
     payload: Payload,
@@ -150,7 +150,7 @@ impl Transcriber {
         }
     }
 
-    /// When the samples of a stream were taken: evenly up to the next payload; where none follows, as long as the track
+    /// Times of the samples of a stream: evenly up to the next payload; where none follows, as long as the track
     /// says, or at the step of the payloads before.
     fn times(
         &mut self,

@@ -1,7 +1,7 @@
 //! Bytes of a log, in any cut -> records, and what was wrong. Pure.
 //!
 //! Apart from the frames because it alone decides where one begins: a frame is believed by its checksum, or, where
-//! that can not be known, if another follows it.
+//! that cannot be known, if another follows it.
 
 use super::frame::{Checked, Frame, LONGEST, frame, is_log};
 use super::message;

@@ -10,7 +10,7 @@ use super::record::{AttachmentRecord, Record, op};
 /// four bytes and one of eight, and behind them the CRC.
 const FIXED: usize = 8 + 8 + 4 + 4 + 8;
 
-/// The record, or why it can not be copied.
+/// The record, or why it cannot be copied.
 pub(super) fn intact(opcode: u8, body: &[u8]) -> Result<Record<'_>, ProblemKind> {
     let what = match opcode {
         op::ATTACHMENT => "attachment",

@@ -195,14 +195,14 @@ fn room(buf: &mut Vec<u8>, n: usize) -> &mut [u8] {
     buf.get_mut(..n).unwrap_or(&mut [])
 }
 
-/// The records of a block, or why they can not be used.
+/// The records of a block, or why they cannot be used.
 pub(super) type Opened<'a> = Result<&'a [u8], ProblemKind>;
 
 impl Buffers {
     /// Reads, unpacks and checks a block.
     ///
     /// # Errors
-    /// Only when the file itself can not be read.
+    /// Only when the file itself cannot be read.
     pub(super) fn open<'a>(&'a mut self, block: &'a Block) -> io::Result<Opened<'a>> {
         let bag = match block.kind {
             Kind::Bag {
@@ -336,7 +336,7 @@ const LEAST_RECORD: usize = MESSAGES_A_BYTE * 31;
 
 const TOO_MANY: &str = "it has more messages than so few bytes can tell apart";
 
-/// How many messages a chunk of so many packed bytes may have.
+/// Largest number of messages in a chunk of so many packed bytes.
 pub(super) fn most_messages(packed: usize) -> usize {
     packed
         .saturating_mul(MESSAGES_A_BYTE)

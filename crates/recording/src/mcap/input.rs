@@ -136,7 +136,7 @@ impl Read for Stretch<'_> {
     }
 }
 
-/// Where the bytes come from.
+/// Source of the bytes.
 pub(super) enum Input {
     File(Arc<LogFile>),
     Stream {
@@ -301,7 +301,7 @@ impl Tape {
         Ok(done)
     }
 
-    /// Moves a file's position anywhere; a stream can not.
+    /// Moves a file's position anywhere; a stream cannot.
     pub(super) fn seek(&mut self, position: u64) {
         if let Input::File(_) = self.input {
             self.position = position;

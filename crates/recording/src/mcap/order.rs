@@ -65,7 +65,7 @@ pub(super) struct Batch<T> {
 /// Weight from which on the items of a block are passed on, and more are made of it only then.
 pub(super) const PIECE: usize = 8 << 20;
 
-/// What an item may have allocated beside the payload.
+/// Bytes that an item may have allocated beside the payload.
 const ALLOCATED: usize = 64;
 
 impl<T> Default for Batch<T> {

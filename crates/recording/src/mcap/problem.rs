@@ -6,7 +6,7 @@
 use std::fmt;
 
 /// Number of problems kept in full; the rest are only counted, so that a hostile file
-/// can not fill memory with complaints.
+/// cannot fill memory with complaints.
 const KEPT: usize = 100;
 
 /// One thing that was wrong, and where.
@@ -149,7 +149,7 @@ pub enum ProblemKind {
         /// Messages found.
         found: u64,
     },
-    /// An attachment or metadata record that can not be used; met only where these are copied.
+    /// An attachment or metadata record that cannot be used; met only where these are copied.
     Attached {
         /// "attachment" or "metadata".
         what: &'static str,
@@ -191,14 +191,14 @@ pub enum ProblemKind {
         /// Number of pages.
         pages: u32,
     },
-    /// A page of a database that can not be read.
+    /// A page of a database that cannot be read.
     Page {
         /// Number of the page, from 1.
         page: u32,
         /// Why.
         why: &'static str,
     },
-    /// A row of a database that can not be read, or is no message.
+    /// A row of a database that cannot be read, or is no message.
     Row {
         /// Why.
         why: &'static str,
@@ -208,17 +208,17 @@ pub enum ProblemKind {
         /// The table.
         name: &'static str,
     },
-    /// The file beside a database with its last pages can not be used, or not as a whole.
+    /// The file beside a database with its last pages cannot be used, or not as a whole.
     Beside {
         /// Why.
         why: &'static str,
     },
-    /// A video whose telemetry can not be found, or not all of it.
+    /// A video whose telemetry cannot be found, or not all of it.
     Video {
         /// Why.
         why: &'static str,
     },
-    /// Telemetry of a camera that can not be read.
+    /// Telemetry of a camera that cannot be read.
     Telemetry {
         /// Description.
         why: &'static str,
@@ -227,7 +227,7 @@ pub enum ProblemKind {
     Checksum,
     /// A file beside a database says that a change of it was not ended.
     Journal,
-    /// The summary at the end can not be used; nothing is lost by that.
+    /// The summary at the end cannot be used; nothing is lost by that.
     BadSummary {
         /// Why.
         why: &'static str,
@@ -266,10 +266,7 @@ impl fmt::Display for ProblemKind {
                 )
             }
             ProblemKind::UnfinishedChunk { read_on: false } => {
-                write!(
-                    f,
-                    "the writer stopped inside this chunk; it can not be read"
-                )
+                write!(f, "the writer stopped inside this chunk; it cannot be read")
             }
             ProblemKind::Garbage { skipped } => {
                 write!(f, "no record here; {skipped} bytes skipped")
@@ -328,7 +325,7 @@ impl fmt::Display for ProblemKind {
                 } else {
                     "channel"
                 };
-                write!(f, "{what} record that can not be read")
+                write!(f, "{what} record that cannot be read")
             }
             ProblemKind::TooManyDefinitions => {
                 write!(f, "more schemas and channels than fit the limit; ignored")
@@ -357,7 +354,7 @@ impl fmt::Display for ProblemKind {
             ProblemKind::Attached { what, why } => write!(f, "{what} record skipped: {why}"),
             ProblemKind::WrongRecord { kind, length } => write!(
                 f,
-                "a record of type {:?} with {length} bytes that can not be used; skipped",
+                "a record of type {:?} with {length} bytes that cannot be used; skipped",
                 char::from(*kind)
             ),
             ProblemKind::Dropout { millis } => write!(
@@ -368,7 +365,7 @@ impl fmt::Display for ProblemKind {
                 f,
                 "the log needs a feature this program does not know (flags {bits:#x})"
             ),
-            ProblemKind::Database { why } => write!(f, "the database can not be read: {why}"),
+            ProblemKind::Database { why } => write!(f, "the database cannot be read: {why}"),
             ProblemKind::PagesMissing { need, have } => {
                 write!(f, "the file is cut: of {need} pages {have} are there")
             }
@@ -377,9 +374,9 @@ impl fmt::Display for ProblemKind {
                 "the recorder was stopped: {pages} pages are of no finished transaction; messages in them are read all the same"
             ),
             ProblemKind::Page { page, why } => {
-                write!(f, "page {page} of the database can not be read: {why}")
+                write!(f, "page {page} of the database cannot be read: {why}")
             }
-            ProblemKind::Row { why } => write!(f, "a row can not be read: {why}; skipped"),
+            ProblemKind::Row { why } => write!(f, "a row cannot be read: {why}; skipped"),
             ProblemKind::NoTable { name } => {
                 write!(f, "the database has no table {name:?} that can be read")
             }
@@ -387,17 +384,17 @@ impl fmt::Display for ProblemKind {
                 write!(f, "the file -wal beside the database: {why}")
             }
             ProblemKind::Video { why } => {
-                write!(f, "the telemetry of the video can not be read: {why}")
+                write!(f, "the telemetry of the video cannot be read: {why}")
             }
             ProblemKind::Telemetry { why } => {
-                write!(f, "telemetry that can not be read: {why}; skipped")
+                write!(f, "telemetry that cannot be read: {why}; skipped")
             }
             ProblemKind::Checksum => write!(f, "the checksum of a message is wrong; skipped"),
             ProblemKind::Journal => write!(
                 f,
                 "a file -journal beside the database says that it is in the middle of a change; `sqlite3 FILE .tables` puts it right"
             ),
-            ProblemKind::BadSummary { why } => write!(f, "the summary can not be used: {why}"),
+            ProblemKind::BadSummary { why } => write!(f, "the summary cannot be used: {why}"),
         }
     }
 }
@@ -475,7 +472,7 @@ impl Problems {
         self.losses
     }
 
-    /// Messages known to be lost; a lower bound, since a lost chunk without an index can not be counted.
+    /// Messages known to be lost; a lower bound, since a lost chunk without an index cannot be counted.
     #[must_use]
     pub fn messages_lost(&self) -> u64 {
         self.messages

@@ -226,7 +226,7 @@ impl Scanner {
         self.claimed_in_all.filter(|_| self.done && self.complete)
     }
 
-    /// Whether a record of this length can be stepped over. A stream can not be asked how long it
+    /// Whether a record of this length can be stepped over. A stream cannot be asked how long it
     /// is, so there only an attachment may be longer than the limit.
     fn may_skip(&self, opcode: u8, length: u64) -> bool {
         match self.tape.remaining() {

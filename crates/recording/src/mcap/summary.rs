@@ -33,13 +33,13 @@ pub(super) struct Summary {
     bytes: usize,
 }
 
-/// A summary, none (`Ok(None)`), or why there is one that can not be used.
+/// A summary, none (`Ok(None)`), or why there is one that cannot be used.
 pub(super) type Found = Result<Option<Summary>, &'static str>;
 
 /// Reads the summary of a file.
 ///
 /// # Errors
-/// Only when the file itself can not be read.
+/// Only when the file itself cannot be read.
 pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<Found> {
     const END: usize = HEAD + Footer::LEN as usize + MAGIC.len();
     let Some(footer_at) = file

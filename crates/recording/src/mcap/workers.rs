@@ -22,7 +22,7 @@ const SPARE_BYTES: usize = 4 << 20;
 /// Weight of all items that may wait for their turn; a block of more is given back, and done when its turn has come.
 const MOST_WAITING: usize = 4 << 20;
 
-/// What one worker needs and the next can use again.
+/// Memory that one worker needs and the next can use again.
 #[derive(Debug, Default)]
 pub(super) struct Bench {
     pub(super) buffers: Buffers,
@@ -162,7 +162,7 @@ impl<T> Default for Piece<T> {
     }
 }
 
-/// What became of a block.
+/// Outcome of a block.
 #[derive(Debug)]
 pub(super) enum Done<T> {
     Walked {
@@ -171,11 +171,11 @@ pub(super) enum Done<T> {
         /// Fault that ended the pass early, and bytes of the block behind it.
         fault: Option<(ProblemKind, u64)>,
     },
-    /// The block can not be used.
+    /// The block cannot be used.
     Bad(ProblemKind),
     /// Block that changes the table, so that it has to be done in file order.
     InOrder,
-    /// The file can not be read.
+    /// The file cannot be read.
     Failed(io::Error),
 }
 

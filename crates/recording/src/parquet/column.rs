@@ -1,6 +1,6 @@
 //! The pages of a column in a group of rows -> its cells, one after the other. I/O: seeks and reads.
 //!
-//! Apart from the rows because columns are read side by side, each at a page of its own: a page that can not be read
+//! Apart from the rows because columns are read side by side, each at a page of its own: a page that cannot be read
 //! costs its rows, and no more than those.
 
 use super::encoding::{Bytes, Values, differences, plain, runs, texts};
@@ -77,7 +77,7 @@ impl Column {
     /// Writes the cell of the next row; what it says is why the row is lost.
     ///
     /// # Errors
-    /// It can not be written.
+    /// It cannot be written.
     pub(super) fn write(&mut self, out: &mut Vec<u8>) -> io::Result<Option<Arc<str>>> {
         if self.page.row >= self.page.rows {
             return Ok(Some("the column has fewer values than rows".into()));
@@ -113,7 +113,7 @@ impl Column {
     /// lost.
     ///
     /// # Errors
-    /// The file can not be read.
+    /// The file cannot be read.
     pub(super) fn turn(&mut self, source: &mut (impl Read + Seek), room: u64) -> io::Result<()> {
         self.page = Page::default();
         self.page = match self.read(source, room)? {
@@ -134,7 +134,7 @@ impl Column {
         }
     }
 
-    /// A page; `None` where it is none of rows. `Err` where the next one can not be found.
+    /// A page; `None` where it is none of rows. `Err` where the next one cannot be found.
     fn read(
         &mut self,
         source: &mut (impl Read + Seek),

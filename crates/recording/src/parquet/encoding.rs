@@ -196,7 +196,7 @@ pub(super) fn differences(
         Stored::Int32 => i64::from(value as i32),
         _ => value,
     };
-    let wrong = "blocks of differences that can not be";
+    let wrong = "blocks of differences that cannot be";
     let (block, parts) = (bytes.varint()?, bytes.varint()?);
     let (total, mut value) = (bytes.varint()?, bytes.zigzag()?);
     if block == 0

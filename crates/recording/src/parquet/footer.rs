@@ -97,7 +97,7 @@ impl Footer {
     /// Reads the footer's bytes.
     ///
     /// # Errors
-    /// In words, what can not be.
+    /// In words, what cannot be.
     pub(super) fn parse(bytes: &[u8]) -> Result<Footer, String> {
         let mut footer = Footer::default();
         let mut elements = Vec::new();

@@ -61,7 +61,7 @@ impl<S: Read + Seek> Rows<S> {
     /// Reads the footer; `given` is what the user says of columns.
     ///
     /// # Errors
-    /// It can not be read; it has no footer, or one that can not be; it is encrypted.
+    /// It cannot be read; it has no footer, or one that cannot be; it is encrypted.
     pub(crate) fn open(mut source: S, given: Option<&Columns>) -> Result<Rows<S>, Trouble> {
         let not = |what: String| Trouble::Not(Diagnostic::new(what));
         let length = source.seek(io::SeekFrom::End(0)).map_err(Trouble::Read)?;

@@ -1,7 +1,7 @@
 //! The body of a page, packed -> its bytes. Pure.
 //!
-//! Apart from the pages because others wrote the unpackers: none is given more room than the page says it needs, and no page
-//! may say more than [`MOST_PAGE`], which is asked before.
+//! Apart from the pages because others wrote the unpackers: none is given more room than the page says it needs, and
+//! no page may say more than [`MOST_PAGE`], which is asked before.
 
 use std::io::Read;
 
@@ -11,7 +11,7 @@ pub(super) const MOST_PAGE: usize = 64 << 20;
 /// Unpacks `body` to exactly `length` bytes.
 ///
 /// # Errors
-/// In words: it can not be unpacked, or to another length; a codec that is not read.
+/// In words: it cannot be unpacked, or to another length; a codec that is not read.
 pub(super) fn unpacked(codec: i64, body: &[u8], length: usize) -> Result<Vec<u8>, String> {
     let bad = |name: &str, why: &dyn std::fmt::Display| format!("{name}: {why}");
     let bytes = match codec {

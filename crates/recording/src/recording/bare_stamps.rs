@@ -62,7 +62,7 @@ impl BareStamps {
         self.stated.steps()
     }
 
-    /// Those of the samples that wait: what is of other sensors than the gyro comes at other steps.
+    /// Numbers of the samples that wait: what is of other sensors than the gyro comes at other steps.
     fn numbers(&self) -> impl Iterator<Item = Bare> {
         let own = self.waiting.iter().filter(|(raw, _)| !raw.is_beside);
         own.filter_map(|(_, bare)| *bare)

@@ -328,7 +328,7 @@ impl Route {
     }
 }
 
-/// The orientations, or the vectors beside samples, in a message; one that can not be read is one less.
+/// The orientations, or the vectors beside samples, in a message; one that cannot be read is one less.
 fn recorded(
     decoder: &Decoder,
     message: &Message<'_>,

@@ -43,7 +43,7 @@ struct Tables {
 /// Looks at the files of a folder, not at those of folders in it.
 ///
 /// # Errors
-/// It can not be read; there is no recording in it, or more than one.
+/// It cannot be read; there is no recording in it, or more than one.
 pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
     let unsupported = |what: Diagnostic| Error::unsupported(path, what);
     let files = files(path)?;

@@ -26,10 +26,10 @@ pub enum Incoming<R> {
 }
 
 /// Whether a stream holds messages or lines; `name` is what errors call it. No more is read than tells it, but
-/// of a log that can not be read as it comes; then `warn` is told what [`Input::of_stream`] has to say.
+/// of a log that cannot be read as it comes; then `warn` is told what [`Input::of_stream`] has to say.
 ///
 /// # Errors
-/// It can not be read, is empty, or of a format that is known and not read; options that are not for its format.
+/// It cannot be read, is empty, or of a format that is known and not read; options that are not for its format.
 pub fn incoming<R: Read + Send + 'static>(
     name: &Path,
     input: R,

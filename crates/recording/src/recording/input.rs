@@ -136,7 +136,7 @@ impl Input {
     /// read to its end.
     ///
     /// # Errors
-    /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a
+    /// It cannot be opened or read, or is empty; a folder of no recording or of several; there is no room for a
     /// stream; nothing at an address, or no way there.
     pub fn open(path: &Path, warn: &Warn) -> Result<Input> {
         match Source::parse(&path.to_string_lossy()) {
@@ -206,7 +206,7 @@ impl Input {
     /// Opens several files that continue each other, in any order.
     ///
     /// # Errors
-    /// One can not be opened, comes only once, is a folder or given twice, or is of another format than the first.
+    /// One cannot be opened, comes only once, is a folder or given twice, or is of another format than the first.
     pub fn joined(paths: &[PathBuf], warn: &Warn) -> Result<Input> {
         several::checked(paths)?;
         let mut formats = Vec::new();
@@ -241,7 +241,7 @@ impl Input {
     /// Reads a stream to its end; `name` is what errors call it.
     ///
     /// # Errors
-    /// It can not be read, or is empty; there is no room for it.
+    /// It cannot be read, or is empty; there is no room for it.
     pub fn of_stream(name: &Path, from: impl Read, warn: &Warn) -> Result<Input> {
         Input::keep(Source::File(name.to_owned()), from, warn)
     }
@@ -330,7 +330,7 @@ impl Input {
     /// Bytes, from the first. Only one such reader of what came once is used at a time.
     ///
     /// # Errors
-    /// It can not be opened.
+    /// It cannot be opened.
     pub fn bytes(&self) -> Result<Bytes> {
         self.is_one_file()?;
         let kept = match &self.kept {
@@ -404,7 +404,7 @@ impl Input {
     /// Whether it is a table that strapd wrote.
     ///
     /// # Errors
-    /// It can not be read, or is no table.
+    /// It cannot be read, or is no table.
     pub fn is_own_table(&self, options: &Options) -> Result<bool> {
         let lines = self
             .lines(&Options::default())

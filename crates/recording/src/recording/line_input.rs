@@ -13,7 +13,7 @@ use strapd_attitude::setting::{COLUMNS, DELIMITER, FIELD};
 /// Begins to read lines or rows.
 ///
 /// # Errors
-/// They can not be read; `--field` for a table, whose columns have names.
+/// They cannot be read; `--field` for a table, whose columns have names.
 pub(super) fn open<R: Read>(
     path: &Path,
     format: Format,
@@ -52,7 +52,7 @@ pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) ->
     })
 }
 
-/// Stamps whose unit can not be told.
+/// Stamps whose unit cannot be told.
 pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     Error::Unsupported {
         path: path.to_owned(),
@@ -68,7 +68,7 @@ pub(super) fn are_judged(lines: &Lines<impl Read>, options: &Options) -> bool {
     lines.table().is_none_or(Table::is_own) && !options.states_stamp_unit()
 }
 
-/// What begins with no line of samples.
+/// Error for what begins with no line of samples.
 pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
     let help = match lines.format() {
         format if format.is_table() => {

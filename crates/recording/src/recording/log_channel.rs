@@ -64,7 +64,7 @@ impl LogChannel {
     /// A decoder for it that has seen its first message.
     ///
     /// # Errors
-    /// The channel can not be decoded: which, why, and the flag that helps.
+    /// The channel cannot be decoded: which, why, and the flag that helps.
     pub fn decoder(&self, decoders: &mut Decoders) -> std::result::Result<Decoder, Unsupported> {
         if let Some(stated) = &self.stated {
             return Ok(Decoder::of_samples(&plain(&self.channel), stated.clone()));

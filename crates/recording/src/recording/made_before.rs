@@ -43,7 +43,7 @@ impl fmt::Display for MadeBefore {
 
 impl MadeBefore {
     /// Finds whether a file on this machine was made before, by its beginning and the summary at its end (one of ours
-    /// without a summary is read whole); of anything else, and where it can not be read, nothing is said.
+    /// without a summary is read whole); of anything else, and where it cannot be read, nothing is said.
     #[must_use]
     pub fn in_file(path: &Path) -> Option<MadeBefore> {
         if !path.is_file() {

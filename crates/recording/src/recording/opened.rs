@@ -62,7 +62,7 @@ impl Recording {
     /// Surveys a recording.
     ///
     /// # Errors
-    /// It can not be read, or is none.
+    /// It cannot be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
         if !input.parts().is_empty() {
             return Recording::of_parts(input, options, pool);
@@ -302,7 +302,7 @@ impl Recording {
     /// was met.
     ///
     /// # Errors
-    /// It can not be read; as `take`.
+    /// It cannot be read; as `take`.
     pub fn walk<E: From<Error>>(
         &self,
         ahead: usize,

@@ -21,20 +21,22 @@ impl Recording {
     /// What is to be known of it and is no error is told to `warn`.
     ///
     /// # Errors
-    /// It can not be opened or read, or is none.
+    /// It cannot be opened or read, or is none.
     pub fn open(path: &Path, selection: &Selection, pool: &Pool, warn: &Warn) -> Result<Recording> {
         let input = Input::open(path, warn)?;
         Recording::told_apart(&input, selection.topic.as_deref(), &selection.decode, pool)
     }
 
-    /// Gives `take` the samples that are selected, in the order of the recording, until it has enough or fails: the topic
-    /// of each, or of several publishers on one the name that tells them apart; the sample in rad/s, m/s^2 and body axes
+    /// Gives `take` the samples that are selected, in the order of the recording, until it has enough or fails: the
+    /// topic
+    /// of each, or of several publishers on one the name that tells them apart; the sample in rad/s, m/s^2 and body
+    /// axes
     /// x forward, y left, z up; and what its format says a rate means. Forces and fields with stamps of their own that
-    /// belong to the samples of the one topic come between them ([`RawSample::is_beside`]). Payloads that could not be read are told to whom
-    /// the recording was opened with, and how many were lost comes back.
+    /// belong to the samples of the one topic come between them ([`RawSample::is_beside`]). Payloads that could not
+    /// be read are told to whom the recording was opened with, and how many were lost comes back.
     ///
     /// # Errors
-    /// No topic of samples, several and none selected, one that can not be decoded; reading fails; as `take`.
+    /// No topic of samples, several and none selected, one that cannot be decoded; reading fails; as `take`.
     pub fn samples<E: From<Error>>(
         &self,
         selection: &Selection,

@@ -66,19 +66,19 @@ pub trait SensorTaker<E> {
     /// The next items, to be taken out of the vector; whether more are wanted.
     ///
     /// # Errors
-    /// They can not be taken.
+    /// They cannot be taken.
     fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>, E>;
     /// The next line may be long in coming.
     ///
     /// # Errors
-    /// What waits can not be handed on.
+    /// What waits cannot be handed on.
     fn pause(&mut self) -> Result<(), E>;
 }
 
 /// Reads lines to their end, or until nobody wants them.
 ///
 /// # Errors
-/// They can not be read; no samples, or without stamps where `clock` wants any; several sensors and none selected; as
+/// They cannot be read; no samples, or without stamps where `clock` wants any; several sensors and none selected; as
 /// `taker`.
 pub fn read<E: From<Error>>(
     (selection, clock): (&Selection, Clock),

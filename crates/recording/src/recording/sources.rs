@@ -88,7 +88,7 @@ pub(super) type Known<'k> = Box<dyn Fn(&Arc<Channel>) -> Arc<Channel> + 'k>;
 /// found without [`Options`].
 ///
 /// # Errors
-/// The log can not be read.
+/// The log cannot be read.
 pub(super) fn tell_apart(
     readers: Vec<(Reader, Known<'_>)>,
     channels: &mut [LogChannel],
@@ -379,7 +379,7 @@ impl Speakers {
         let named = self.frames.iter().filter(|(frame, _)| frame.is_some());
         let most = named.map(|(_, n)| *n).max().unwrap_or(0);
         let is_named = self.frames.keys().any(Option::is_some);
-        // A payload that can not be read names none.
+        // A payload that cannot be read names none.
         let is_frame = |frame: &Option<String>| {
             frame.is_some() == is_named
                 && self.frames.get(frame).is_some_and(|n| *n >= FEW.min(most))

@@ -60,7 +60,8 @@ impl StatedNanos {
         self.steps
     }
 
-    /// Returns the steps if most are shorter than any gyro's, other than in bursts, and would be a gyro's in another unit.
+    /// Returns the steps if most are shorter than any gyro's, other than in bursts, and would be a gyro's in another
+    /// unit.
     #[must_use]
     pub fn too_fast(&self) -> Option<TooFast> {
         let is_ordinary = self.steps >= FEWEST && 2 * self.short > self.steps;

@@ -49,7 +49,7 @@ impl<'l> TopicReading<'l> {
     /// The topic called `named`, or the log's IMU.
     ///
     /// # Errors
-    /// As [`Recording::choose`]; a channel of it can not be decoded.
+    /// As [`Recording::choose`]; a channel of it cannot be decoded.
     pub fn new(
         log: &'l Recording,
         named: Option<&str>,
@@ -66,7 +66,7 @@ impl<'l> TopicReading<'l> {
     /// The topic, or publisher on one, of this name.
     ///
     /// # Errors
-    /// It is not there; a channel of it can not be decoded.
+    /// It is not there; a channel of it cannot be decoded.
     pub(super) fn of(
         log: &'l Recording,
         topic: &str,

@@ -1,6 +1,6 @@
 //! Channels of a log -> the topics to estimate from. Pure.
 //!
-//! Never mixes two IMUs, never guesses silently: when a choice is made it is said, when it can not
+//! Never mixes two IMUs, never guesses silently: when a choice is made it is said, when it cannot
 //! be made the error lists what is there.
 
 use crate::error::{Error, Result};

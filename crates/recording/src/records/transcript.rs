@@ -1,7 +1,7 @@
 //! Contents of another container -> the records MCAP has for it. Pure.
 //!
 //! A stage of its own so that ULog and bags need no second way through the house: their readers write schemas,
-//! channels and messages here, and what follows (definitions, workers, order, counting) can not tell.
+//! channels and messages here, and what follows (definitions, workers, order, counting) cannot tell.
 
 use super::op;
 

@@ -30,9 +30,9 @@ pub(crate) enum FaultKind {
     Cut { need: u32, have: u32 },
     /// More are there than the last transaction says.
     Uncommitted { pages: u32 },
-    /// A page that can not be read.
+    /// A page that cannot be read.
     Page { page: u32, why: &'static str },
-    /// A row that can not be read, or is no message.
+    /// A row that cannot be read, or is no message.
     Row { why: &'static str },
     /// Missing table.
     NoTable { name: &'static str },
@@ -76,7 +76,7 @@ impl Bag {
     /// definitions may take `most`.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     pub(crate) fn open(
         pages: &mut dyn Pages,
         header: Header,
@@ -178,7 +178,7 @@ impl Bag {
     /// Tells the next message; whether there may be more.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     pub(crate) fn next(&mut self, pages: &mut dyn Pages, to: &mut Transcript) -> io::Result<bool> {
         let rows = match self.table.next(pages, &mut self.seen)? {
             Found::Row { page, rowid, row } => {

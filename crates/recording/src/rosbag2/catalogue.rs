@@ -15,7 +15,7 @@ const MOST: usize = 4 << 20;
 #[derive(Debug, Default)]
 pub(super) struct Catalogue {
     leaves: BTreeSet<(i64, u32)>,
-    /// There were more than are kept.
+    /// Whether there were more than are kept.
     pub(super) is_full: bool,
 }
 
@@ -23,7 +23,7 @@ impl Catalogue {
     /// Looks at every page that was not seen. `first` tells the first row of one that is wanted.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     pub(super) fn of(
         pages: &mut dyn Pages,
         seen: &Seen,

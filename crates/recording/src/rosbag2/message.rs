@@ -11,7 +11,8 @@ use std::io::Read;
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 /// Bytes that one packed may stand for, and what may come to that: an image of one colour packs well.
 const UNPACKED: (u64, u64) = (1000, 1 << 20);
-/// What may come to that for all messages together: of half a megabyte, ten thousand would be unpacked.
+/// Bytes that all messages together may unpack to beyond their share: of half a megabyte, ten thousand would be
+/// unpacked.
 pub(super) const SPARE: u64 = 256 << 20;
 
 /// Indices of the columns in a row.

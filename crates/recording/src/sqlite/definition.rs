@@ -35,7 +35,7 @@ impl Definition {
 /// The tables of a database, and whether all were read.
 ///
 /// # Errors
-/// Only when the input itself can not be read.
+/// Only when the input itself cannot be read.
 pub(crate) fn definitions(
     pages: &mut dyn Pages,
     seen: &mut Seen,

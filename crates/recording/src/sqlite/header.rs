@@ -36,7 +36,7 @@ impl Header {
     /// Reads it.
     ///
     /// # Errors
-    /// Why it can not be used, in words.
+    /// Why it cannot be used, in words.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Header, &'static str> {
         let (Some(head), true) = (bytes.first_chunk::<HEADER>(), bytes.starts_with(&MAGIC)) else {
             return Err("the header is cut");

@@ -37,7 +37,7 @@ impl<'a> Value<'a> {
     }
 }
 
-/// The values of a row, one after the other; what can not be read ends them.
+/// The values of a row, one after the other; what cannot be read ends them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<'a> {
     kinds: &'a [u8],

@@ -37,12 +37,12 @@ pub(crate) enum Found<'a> {
         rowid: i64,
         row: Row<'a>,
     },
-    /// A row that can not be read.
+    /// A row that cannot be read.
     LostRow {
         page: u32,
         why: &'static str,
     },
-    /// A page with these rows that can not be read.
+    /// A page with these rows that cannot be read.
     LostPage {
         page: u32,
         why: &'static str,
@@ -82,7 +82,7 @@ impl Table {
     /// The next row, or what is lost in its place.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     pub(crate) fn next(&mut self, pages: &mut dyn Pages, seen: &mut Seen) -> io::Result<Found<'_>> {
         while self.next >= self.cells {
             if let Some(lost) = self.turn(pages, seen)? {
@@ -169,7 +169,7 @@ impl Table {
     }
 }
 
-/// Puts a row together, or says why that can not be done.
+/// Puts a row together, or says why that cannot be done.
 fn join(
     cell: &Cell<'_>,
     longest: u64,

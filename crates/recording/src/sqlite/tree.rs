@@ -1,6 +1,6 @@
 //! The root of a table -> its leaves, in the order of their rows. Pure, but for who has the pages.
 //!
-//! Apart from the rows because a page that can not be read is a hole between two numbers of rows here, which others may
+//! Apart from the rows because a page that cannot be read is a hole between two numbers of rows here, which others may
 //! fill.
 
 use super::page::{Kind, Page};
@@ -39,7 +39,7 @@ struct Level {
 pub(crate) enum Step {
     /// A leaf, whose bytes were copied.
     Leaf(u32),
-    /// A page with these rows that can not be used.
+    /// A page with these rows that cannot be used.
     Lost {
         page: u32,
         why: &'static str,
@@ -60,7 +60,7 @@ impl Tree {
     /// The next leaf, into `leaf`.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     pub(crate) fn next(
         &mut self,
         pages: &mut dyn Pages,

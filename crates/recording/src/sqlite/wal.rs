@@ -43,7 +43,7 @@ impl Wal {
     /// Reads the head.
     ///
     /// # Errors
-    /// Why it can not be used, in words.
+    /// Why it cannot be used, in words.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Wal, &'static str> {
         let head = bytes.get(..HEAD).ok_or("its header is cut")?;
         let is_big = match word(head, 0) {

@@ -41,7 +41,7 @@ pub(crate) enum FaultKind {
     Garbage { skipped: u64 },
     /// A record without the marks of its type.
     Wrong { kind: u8, length: u64 },
-    /// A definition that can not be used.
+    /// A definition that cannot be used.
     Definition { kind: u8 },
     /// Definitions beyond the limits.
     TooMany,

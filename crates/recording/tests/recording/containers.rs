@@ -1,5 +1,5 @@
-//! ULog, ROS 1 bags, ROS 2 in SQLite: what readers nobody here made read of the same files, from files and pipes, on any number of
-//! threads, cut and damaged.
+//! ULog, ROS 1 bags, ROS 2 in SQLite: what readers nobody here made read of the same files, from files and pipes, on
+//! any number of threads, cut and damaged.
 
 use crate::mcap_logs::{Read, from_bytes, in_order, pool, read};
 use crate::meter::Meter;
@@ -360,7 +360,7 @@ fn thousands_of_changed_logs_neither_panic_nor_hang_nor_lose_anything_in_silence
             assert!(report.survey.messages as usize == ours.len());
             damaged += 1;
             let lost = report.survey.problems.losses();
-            // Neither format has checksums for all: what is changed in place can not be seen. What is gone can.
+            // Neither format has checksums for all: what is changed in place cannot be seen. What is gone can.
             if ours.len() < all.len() && (!told || lost == 0 || lost < before.min(1)) {
                 silent += 1;
                 eprintln!(

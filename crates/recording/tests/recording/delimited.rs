@@ -1,4 +1,4 @@
-//! Promise: tables of text are read whoever wrote them, what they mean is said, and what can not be told is refused
+//! Promise: tables of text are read whoever wrote them, what they mean is said, and what cannot be told is refused
 //! with the flag that tells it.
 //!
 //! The files are written here, after their makers' documentation; real ones are read in `tests/commands/tables.rs`.

@@ -1,5 +1,5 @@
-//! Telemetry of GoPro's cameras: the numbers that GoPro's own parser reads of the same payloads, alone and as a track of a
-//! video, with stamps; cut, changed, and videos of something else.
+//! Telemetry of GoPro's cameras: the numbers that GoPro's own parser reads of the same payloads, alone and as a track
+//! of a video, with stamps; cut, changed, and videos of something else.
 
 use crate::mcap_logs::{from_bytes, read};
 use crate::meter::Meter;

@@ -334,7 +334,7 @@ fn an_index_whose_length_is_too_long_costs_no_messages() {
         let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) + more;
         broken[at + 1..at + 9].copy_from_slice(&length.to_le_bytes());
         let dir = tempfile::tempdir().unwrap();
-        // A stream can not go back to where it still knew what it read; a file can.
+        // A stream cannot go back to where it still knew what it read; a file can.
         let (items, report) = read(on_disk(&broken, dir.path(), "a.mcap"));
         assert!(items == written, "{more}: {}", items.len());
         assert!(report.survey.problems.losses() > 0, "{more}");

@@ -31,7 +31,7 @@ pub(crate) struct Noted<'a> {
     pub(crate) zeros: u64,
     /// Stamps with a second or more of nanoseconds.
     pub(crate) stamps_carried: u64,
-    /// Where the magnetic field stood still while the body rotated.
+    /// Time for which the magnetic field stood still while the body rotated.
     pub(crate) frozen_field: Option<Frozen>,
     /// Frames of other bodies on the topic, and how many messages named them.
     pub(crate) left_out: &'a [(String, u64)],

@@ -225,7 +225,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         .advise({
             let advice = "if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them";
             match looked.has_reference {
-                true => format!("{advice}: they can not tell, {AGAINST_RECORDED} may"),
+                true => format!("{advice}: they cannot tell, {AGAINST_RECORDED} may"),
                 false => advice.to_owned(),
             }
         })
@@ -263,7 +263,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
     })
 }
 
-/// So many samples are missing.
+/// Finding for so many missing samples.
 pub(super) fn missing_samples(missing: u64, longest_secs: f64, gaps: u64) -> Finding {
     Finding::new(
         Severity::Warning,
@@ -291,10 +291,10 @@ fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Findi
         .any(|format| looked.described.ends_with(&format!("[{}]", format.name())));
     match is_table {
         true => found
-            .advise("so gravity can not correct the attitude: say the unit")
+            .advise("so gravity cannot correct the attitude: say the unit")
             .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),
         false => found.advise(
-            "so gravity can not correct the attitude, and no setting says otherwise: record m/s^2",
+            "so gravity cannot correct the attitude, and no setting says otherwise: record m/s^2",
         ),
     }
 }
@@ -363,7 +363,7 @@ pub(super) fn zero_rows(n: u64, total: u64) -> Option<Finding> {
     )
 }
 
-/// So many of all, where there are any.
+/// Finding for so many of all, if there are any.
 pub(super) fn some(
     (n, total): (u64, u64),
     (severity, code): (Severity, &'static str),

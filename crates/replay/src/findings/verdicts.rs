@@ -1,4 +1,4 @@
-//! What became of samples -> findings, one for each verdict that there was. Pure.
+//! Outcomes of samples -> findings, one for each verdict that there was. Pure.
 //!
 //! Apart from the rest because it must be complete: what conditioning turns away and nobody names is lost in silence.
 
@@ -28,7 +28,7 @@ fn of(verdict: Verdict, n: u64, total: u64) -> Option<Finding> {
         ),
         Verdict::Undecodable => found(
             (Error, "undecodable"),
-            "payloads can not be decoded",
+            "payloads cannot be decoded",
             "they are left out and counted",
         ),
         Verdict::NoGyro => gyro_absent(n, total),

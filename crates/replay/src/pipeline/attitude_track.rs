@@ -40,7 +40,7 @@ pub struct Track {
     pub entries: Vec<Entry>,
     /// Instants of its resets: from each on its world is another.
     pub cuts: Vec<Nanos>,
-    /// What the file says of the error of each of them, in body axes (FLU); empty where it does not of all.
+    /// Covariances of their errors that the file states, in body axes (FLU); empty if it does not for all.
     pub covariances: Vec<AttitudeCovariance>,
     /// Problems of the file.
     pub problems: Vec<String>,
@@ -59,7 +59,7 @@ pub enum Side {
 /// Reads a track: NDJSON, CSV or MCAP, by what the file holds.
 ///
 /// # Errors
-/// The file can not be read, or holds no attitude, or several and none named.
+/// The file cannot be read, or holds no attitude, or several and none named.
 pub fn read(
     input: &Input,
     side: Side,
@@ -334,7 +334,7 @@ const LINE_LIMIT: u64 = 64 * 1024;
 /// taken for a reference and left for an estimate.
 ///
 /// # Errors
-/// The file can not be read, a line is not JSON or is too long, or several ids and none named.
+/// The file cannot be read, a line is not JSON or is too long, or several ids and none named.
 fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
     let file = input.bytes()?;
@@ -422,7 +422,7 @@ struct Row {
 /// Reads a CSV file with at least the columns `stamp_ns,qw,qx,qy,qz`.
 ///
 /// # Errors
-/// The file can not be read, a cell is not a number, or no row has an attitude.
+/// The file cannot be read, a cell is not a number, or no row has an attitude.
 fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
     let refuse = |what: String| {

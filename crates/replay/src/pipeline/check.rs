@@ -4,10 +4,11 @@
 //! gaps and turns per step is what a replay would do, and not another program's opinion.
 
 use super::attitude_track::Track;
-use super::each::{Told, each};
+use super::each::each;
 use super::inspection::look_as;
 use super::position::Position;
 use super::request::ReplayRequest;
+use super::summarise::Told;
 use crate::error::Result;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
 use strapd_attitude::diagnostic::Diagnostic;
@@ -46,7 +47,7 @@ pub struct Examination<'a> {
 /// Examines a log, or one topic of it, as a replay with default flags understands it.
 ///
 /// # Errors
-/// It can not be read, or holds no such topic.
+/// It cannot be read, or holds no such topic.
 pub fn check(
     input: &Input,
     named: Option<&str>,
@@ -73,7 +74,7 @@ pub fn check(
 /// Examines a log, or one topic of it.
 ///
 /// # Errors
-/// It can not be read, or holds no such topic.
+/// It cannot be read, or holds no such topic.
 pub fn examine(
     input: &Input,
     asked: &Examination<'_>,

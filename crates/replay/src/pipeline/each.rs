@@ -14,9 +14,9 @@ use super::request::ReplayRequest;
 use super::session::{Session, Topic};
 use super::session_builder::labelled;
 use super::summarise;
+use super::summarise::Told;
 use crate::error::{Error, Result};
 use crate::sink::{Provenance, Stream};
-use crate::summary::TopicSummary;
 use std::ops::ControlFlow;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Recording;
@@ -24,13 +24,10 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::opened::AHEAD;
 
-/// Summary of a topic, or the reason why there is none.
-pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
-
 /// Integrates the topics called `names`, without outputs; by name, in their order.
 ///
 /// # Errors
-/// The log can not be read.
+/// The log cannot be read.
 pub(super) fn each(
     run: &ReplayRequest,
     log: &Recording,

@@ -163,7 +163,7 @@ impl Look {
 /// IMU's.
 ///
 /// # Errors
-/// The log can not be read, or `named` not decoded.
+/// The log cannot be read, or `named` not decoded.
 pub fn look(log: &Recording, named: Option<&str>, options: &Options, pool: &Pool) -> Result<Looks> {
     look_as(log, named, (options, &Plan::default()), pool)
 }

@@ -19,7 +19,7 @@ const END: u64 = 1 << 20;
 /// The metadata of a run's outputs.
 ///
 /// # Errors
-/// The input can not be read again.
+/// The input cannot be read again.
 pub fn of(
     run: &ReplayRequest,
     founds: &[Found],
@@ -100,7 +100,7 @@ pub fn of(
 /// SHA-256 of all of a file, hexadecimal.
 ///
 /// # Errors
-/// It can not be read.
+/// It cannot be read.
 pub fn sha256(path: &Path, mut file: impl Read) -> Result<String> {
     let mut offset = 0;
     let fail = |offset, source| strapd_recording::Error::Read {

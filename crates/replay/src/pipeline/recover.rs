@@ -1,7 +1,7 @@
 //! A damaged MCAP -> an intact one of everything that is intact in it. I/O.
 //!
 //! A stage of its own because nothing is decoded: the guarded walk says what is whole, the sink's copy
-//! writes it, both in the order of the file. What the walk can not prove is left out and said.
+//! writes it, both in the order of the file. What the walk cannot prove is left out and said.
 //!
 //! A chunk whose CRC is wrong is left out whole: one changed bit reads as 6e302 rad/s, and nothing
 //! tells which message it is in. A chunk without a CRC, and unchunked messages, are kept as they are
@@ -208,7 +208,7 @@ fn still_wanted(flow: Flow) -> Result<()> {
 /// bounded by the blocks on their way and the largest chunk.
 ///
 /// # Errors
-/// Input or output can not be opened, read or written; then there is no output. Damage is no error:
+/// Input or output cannot be opened, read or written; then there is no output. Damage is no error:
 /// see [`Recovered::survey`].
 pub fn run(run: &Recover, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<Recovered> {
     let reader = match &run.source {

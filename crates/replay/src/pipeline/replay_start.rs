@@ -13,7 +13,7 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::topics;
 
-/// What decides how the samples of `found` begin, before it has seen any.
+/// Preparation that decides how the samples of `found` begin, before it has seen any.
 pub(super) fn preparation(run: &ReplayRequest, found: &Found, patience: Patience) -> Preparation {
     let stamps = StampPass::new(&run.plan, &found.resolved, run.other_kinds());
     Preparation::new(&run.plan, &found.resolved, patience).with_stamps(stamps)
@@ -23,7 +23,7 @@ pub(super) fn preparation(run: &ReplayRequest, found: &Found, patience: Patience
 pub(super) struct Waiting<'r> {
     run: &'r ReplayRequest,
     path: &'r Path,
-    /// What a pass over the file has decided, where it is one.
+    /// Decisions of a pass over the file, where it is one.
     prepared: Option<Prepared>,
     gathering: Option<(Found, Stream, Preparation)>,
     held: Vec<Item>,

@@ -66,7 +66,7 @@ impl ReplayRequest {
     }
 }
 
-/// A topic that can not be run, in the words of the stage that refused it.
+/// A topic that cannot be run, in the words of the stage that refused it.
 pub(super) fn refused(path: &Path, topic: &str, what: Diagnostic) -> error::Error {
     Error::Topic {
         path: path.to_owned(),

@@ -65,7 +65,7 @@ pub(super) struct AgainstRecorded {
     /// Count of its resets that its last message stated, and the instants of those that were seen.
     resets: Option<u8>,
     cuts: Vec<Nanos>,
-    /// What the run itself put out, in the world it was asked for, with what it says of its error.
+    /// Attitudes that the run itself put out, in the world it was asked for, with their stated error.
     own: Thinned<Known>,
     world: World,
     /// Alignment of its world to the reference's, by what it claims of it.
@@ -133,7 +133,7 @@ impl AgainstRecorded {
     /// Makes it for samples understood as `resolved`, but for their meaning.
     ///
     /// # Errors
-    /// In words: settings that can not be.
+    /// In words: settings that cannot be.
     pub(super) fn new(
         plan: &Plan,
         resolved: &Meaning,

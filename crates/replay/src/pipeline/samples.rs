@@ -1,5 +1,5 @@
-//! Samples that a program holds -> their attitudes and the summary of a replay. I/O: a temporary file, of a long recording
-//! that is smoothed.
+//! Samples that a program holds -> their attitudes and the summary of a replay. I/O: a temporary file, of a long
+//! recording that is smoothed.
 //!
 //! The steps, and the words, of a replay of a file: what must be known first is found by a pass over the samples.
 
@@ -41,14 +41,14 @@ impl<E> From<Error> for Stop<E> {
     }
 }
 
-/// What became of samples.
+/// Result of an estimate of samples.
 #[derive(Debug)]
 pub struct Estimated {
     /// The numbers and the words of a replay.
     pub summary: TopicSummary,
     /// Uncertainty of the bias that was removed beforehand, rad/s, body axes.
     pub bias_sigma: [f64; 3],
-    /// What is known of the sensor at the end, without a name.
+    /// Calibration of the sensor at the end, without a name.
     pub calibration: SensorCalibration,
 }
 

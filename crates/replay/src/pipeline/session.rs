@@ -79,7 +79,7 @@ impl LoneZeros {
     }
 }
 
-/// What came out of an estimator.
+/// Output of an estimator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Output {
     /// First attitude.
@@ -90,7 +90,7 @@ pub(super) struct Output {
     pub count: u64,
     /// Largest component of any rate, rad/s.
     pub largest_rate: f64,
-    /// Between attitudes, nanoseconds.
+    /// Steps between attitudes, nanoseconds.
     steps: Histogram,
 }
 
@@ -192,7 +192,7 @@ impl Topic {
         }
     }
 
-    /// What does not fit in memory of a recording that is smoothed goes to a file without a name in the folder of the
+    /// Puts what does not fit in memory of a recording that is smoothed into a file without a name in the folder of the
     /// output, or in that of temporary files.
     pub(super) fn spool_beside(&mut self, targets: &[Target]) {
         let folder = targets.iter().find_map(|target| match target {

@@ -1,7 +1,6 @@
 //! Counts of the stages -> the summary of the run. Pure.
 
 use super::delivery::broken;
-use super::each::Told;
 use super::request::ReplayRequest;
 use super::sample_kinds::AgainstRecorded;
 use super::session::{Ended, Topic};
@@ -58,7 +57,10 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
     }
 }
 
-/// What became of each topic of a run without outputs, or why it has not what was asked for.
+/// Summary of a topic, or the reason why there is none.
+pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
+
+/// Summaries of the topics of a run without outputs, or why one has not what was asked for.
 pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<Told> {
     let told = |mut topic: Topic| match unmet(&run.plan, &topic) {
         Some(what) => Err(what),
@@ -67,7 +69,7 @@ pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<Told> {
     ended.topics.into_iter().map(told).collect()
 }
 
-/// What became of one topic.
+/// Summary of one topic.
 pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     let drawn = drawn(topic);
     let conditioning = topic.estimator.conditioning();

@@ -1,7 +1,7 @@
-//! What was asked of a run and could not be done -> why. Pure.
+//! Requests of a run that could not be met -> why. Pure.
 //!
-//! Apart from the summary because it is no property of an attitude: who asked for north and had no field, or for a window
-//! without a sample, gets no output, and not one that claims what it has not.
+//! Apart from the summary because it is no property of an attitude: who asked for north and had no field, or for a
+//! window without a sample, gets no output, and not one that claims what it has not.
 
 use super::session::Topic;
 use crate::summary::aid::Frozen;
@@ -77,7 +77,7 @@ pub(super) struct FieldWatch {
     /// Different fields, one after the other.
     changes: u64,
     field: Option<Vector3<f64>>,
-    /// Since when it is the same.
+    /// Time since which it is the same.
     since: Nanos,
     /// The direction that it would have by now, and from when on.
     turned: Vector3<f64>,
@@ -88,7 +88,7 @@ pub(super) struct FieldWatch {
 }
 
 impl FieldWatch {
-    /// Of rates of this kind.
+    /// Makes one for rates of this kind.
     pub(super) fn new(kind: SampleKind) -> FieldWatch {
         FieldWatch {
             kind,
@@ -163,14 +163,14 @@ impl FieldWatch {
         }
     }
 
-    /// No more comes.
+    /// Ends it: no more comes.
     pub(super) fn finish(&mut self) {
         if let Some(last) = self.last {
             self.thaw(last);
         }
     }
 
-    /// Where it stood still for a while.
+    /// Stretch for which it stood still.
     pub(super) fn frozen(&self) -> Option<Frozen> {
         self.frozen
     }

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A text output, opened before the work so that a name that can not be is refused at once. Dropped
+/// A text output, opened before the work so that a name that cannot be is refused at once. Dropped
 /// without [`Document::write`], it leaves no file.
 #[derive(Debug)]
 pub struct Document(Output);

@@ -370,7 +370,7 @@ pub fn sync_directory(file: &Path) -> io::Result<()> {
             _ => Path::new("."),
         };
         match File::open(parent).and_then(|d| d.sync_all()) {
-            // Some network file systems can not.
+            // Some network file systems cannot.
             Err(e) if matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => {}
             // A directory one may write to but not list; the file itself is synced.
             Err(e) if e.kind() == ErrorKind::PermissionDenied => {}

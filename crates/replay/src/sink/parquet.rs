@@ -1,6 +1,6 @@
 //! AttitudeSample (and, from a synthetic gyro, RawSample) -> a table in Parquet. Pure.
 //!
-//! A stage of its own because columns can not be written sample by sample: a row group is gathered, and packed column
+//! A stage of its own because columns cannot be written sample by sample: a row group is gathered, and packed column
 //! by column when it is full. What is read back is the numbers' own bits, unless single precision was asked for.
 //!
 //! The names of the columns are those that tables are read by.
@@ -74,7 +74,7 @@ impl Table {
     /// Takes a batch; the bytes of what became full by it.
     ///
     /// # Errors
-    /// It can not be packed.
+    /// It cannot be packed.
     pub(super) fn push(&mut self, batch: &Batch) -> std::io::Result<Vec<u8>> {
         let mut out = Vec::new();
         let mut rest = batch.samples.as_slice();

@@ -157,7 +157,7 @@ pub fn resets(times: usize) -> Option<String> {
     ))
 }
 
-/// How the worlds are laid on each other, in words.
+/// Text of how the worlds are aligned.
 #[must_use]
 pub fn alignment(align: Align) -> &'static str {
     match align {

@@ -21,12 +21,12 @@ pub struct Aided {
     sigma: Calibration,
 }
 
-/// Where a magnetic field stood still while the body rotated.
+/// Stretch for which a magnetic field stood still while the body rotated.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Frozen {
-    /// For so long in all, s.
+    /// Total time, s.
     pub(crate) secs: f64,
-    /// From when on, the first time.
+    /// Beginning of the first.
     pub(crate) from: Nanos,
 }
 
@@ -185,7 +185,7 @@ impl Aided {
         })
     }
 
-    /// What is to be said where the forces have no gravity in them after all.
+    /// Finding for forces that turn out to have no gravity in them.
     #[must_use]
     pub fn given_up(&self) -> Option<Finding> {
         (self.started && self.is_implausible).then(|| {
@@ -198,7 +198,7 @@ impl Aided {
         })
     }
 
-    /// What is to be said where the sensor is farther off than those of its class, `noise`, are.
+    /// Finding for a sensor that is farther off than those of its class, `noise`, are.
     #[must_use]
     pub fn doubt(&self, noise: &str) -> Option<Finding> {
         let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);

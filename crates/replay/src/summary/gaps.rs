@@ -24,18 +24,18 @@ pub struct Gaps {
     pub longest_held_secs: f64,
     /// The longest, s.
     pub longest_secs: f64,
-    /// Where the longest begins, seconds after the first sample.
+    /// Beginning of the longest, seconds after the first sample.
     pub longest_at_secs: f64,
     /// Clocks that jumped back; each is held or reset at, too.
     pub jumps_back: u64,
     /// The farthest jump back, s.
     pub farthest_back_secs: f64,
-    /// Where it was, seconds after the first sample.
+    /// Time of it, seconds after the first sample.
     pub farthest_back_at_secs: f64,
 }
 
 impl Gaps {
-    /// Those of a run.
+    /// Gaps of a run.
     #[must_use]
     pub fn of(report: &condition::Report, propagation: &propagate::Report) -> Gaps {
         let secs = |nanos: i64| nanos as f64 * 1e-9;
@@ -83,13 +83,13 @@ impl Gaps {
         self.bridged + self.held + self.resets
     }
 
-    /// Those over which time went on.
+    /// Number of gaps over which time went on.
     #[must_use]
     pub fn forward(&self) -> u64 {
         self.count().saturating_sub(self.jumps_back)
     }
 
-    /// That a clock was set back, where one was.
+    /// Text about a clock that was set back, if one was.
     #[must_use]
     pub fn back_text(&self) -> Option<String> {
         let Gaps {
@@ -115,7 +115,7 @@ impl Gaps {
         }
     }
 
-    /// What an integration error says nothing of.
+    /// Text of what an integration error does not include.
     pub(super) fn not_in_the_error(&self) -> String {
         let parts: Vec<String> = [
             (self.bridged, self.total_secs - self.held_secs, "bridged"),

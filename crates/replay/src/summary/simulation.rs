@@ -22,7 +22,7 @@ pub struct SimulationSummary {
     pub parameters: Vec<(String, String)>,
     /// Things to know about them.
     pub notes: Vec<String>,
-    /// Stamps ROS messages can not carry.
+    /// Stamps ROS messages cannot carry.
     pub stamps_out_of_range: u64,
     /// Outputs: name, bytes, messages.
     pub outputs: Vec<(String, u64, u64)>,

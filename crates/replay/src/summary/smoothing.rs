@@ -17,7 +17,7 @@ pub struct Smoothing {
     bias: ([f64; 3], [f64; 3]),
     /// The same at its end.
     last_bias: ([f64; 3], [f64; 3]),
-    /// By how much it wanders over the recording, deg/s.
+    /// Wander over the recording, deg/s.
     wander: f64,
     sections: usize,
     has_north: bool,

@@ -79,7 +79,7 @@ pub(super) fn text() -> Result<String, String> {
     Ok(out)
 }
 
-/// Samples at either end where a window of 8 can not be centred.
+/// Samples at either end where a window of 8 cannot be centred.
 const MARGIN: usize = 8;
 
 fn cusped(rate_hz: f64, secs: f64) -> Result<Course, String> {

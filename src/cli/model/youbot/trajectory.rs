@@ -80,13 +80,13 @@ pub(crate) struct Prepared {
 /// A path from the text of a file; `duration` (s) where it says none itself.
 ///
 /// # Errors
-/// In words: what is no path, or one the arm can not drive.
+/// In words: what is no path, or one the arm cannot drive.
 pub(crate) fn from_json(text: &str, unit: Unit, duration: f64) -> Result<Prepared, String> {
     let request: Request = serde_json::from_str(text).map_err(|e| e.to_string())?;
     prepare(&request, unit, Some(duration)).map_err(|refusal| refusal.error)
 }
 
-/// Refuses what can not be driven.
+/// Refuses what cannot be driven.
 fn prepare(request: &Request, unit: Unit, duration: Option<f64>) -> Result<Prepared, Refusal> {
     let setting = Setting::new(request.preset, request.joints, unit);
     let gravity = request.gravity.unwrap_or(dynamics::GRAVITY);

@@ -66,7 +66,7 @@ pub enum Advice {
         /// 99th percentile over the median step.
         share: f64,
     },
-    /// Stamps jitter about straight lines. Whether the sensor samples evenly, they can not tell.
+    /// Stamps jitter about straight lines. Whether the sensor samples evenly, they cannot tell.
     StampsJitterEvenly {
         /// rms distance from the lines over the step.
         jitter: f64,

@@ -140,7 +140,7 @@ impl Counter {
         }
         self.release(out);
         tracker.advance(off, behind + ahead);
-        // A step that is none can not be counted in.
+        // A step that is none cannot be counted in.
         if tracker.step() > 0.0 {
             self.tracker = Some(tracker);
         }

@@ -50,7 +50,7 @@ pub struct Measured {
     pub force_saturated: bool,
 }
 
-/// A reading that can not be.
+/// A reading that cannot be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum MeasureError {
     /// The interval is empty or runs backwards.
@@ -173,7 +173,7 @@ impl GyroModel {
     /// out between two intervals passes for the drift, but is not integrated.
     ///
     /// # Errors
-    /// An interval without length or before the last one's end, or a truth that can not be.
+    /// An interval without length or before the last one's end, or a truth that cannot be.
     // Inlined whole into a caller's loops at link time, LLVM 22 spends minutes in constraint elimination.
     #[inline(never)]
     pub fn measure(

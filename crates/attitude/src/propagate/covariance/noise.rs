@@ -37,7 +37,7 @@ impl Noise {
         }
     }
 
-    /// The name and value of a number that can not be, if any.
+    /// The name and value of a number that cannot be, if any.
     pub(crate) fn fault(&self) -> Option<(&'static str, f64)> {
         let tau = self.bias_tau.unwrap_or(1.0);
         if tau.is_nan() || tau <= 0.0 {

@@ -68,7 +68,7 @@ impl Memory {
             let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
             (norm - 1.0).abs() < 1e-6
         };
-        /// No sum of rotations and no rate between two samples is larger, rad, rad/s.
+        /// Largest sum of rotations and largest rate between two samples, rad, rad/s.
         const MOST: f64 = 1e15;
         let small = |v: &f64| v.abs() <= MOST;
         unit(&self.attitude)

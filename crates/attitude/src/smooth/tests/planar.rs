@@ -30,13 +30,13 @@ impl Noise {
     }
 }
 
-/// How a body stands and travels.
+/// Pose and travel of a body.
 struct Body {
     secs: f64,
     /// Rate about the vertical, rad/s, and speed ahead, m/s.
     turn: fn(f64) -> f64,
     speed: fn(f64) -> f64,
-    /// It leans by this, rad.
+    /// Angle by which it leans, rad.
     lean: f64,
     /// Noise of its motion, m/s^2 and rad/s, by how far it is under way.
     shaking: f64,
@@ -127,7 +127,7 @@ impl Body {
     }
 }
 
-/// What was made of a body.
+/// Result for a body.
 #[derive(Debug)]
 struct Seen {
     /// Error of the bias about the vertical in the middle, and one sigma of it, deg/s.
@@ -160,12 +160,12 @@ fn wanders(t: f64) -> f64 {
     0.5 * (0.83 * t).sin() + 0.4 * (0.31 * t + 1.0).sin() + 0.3 * (1.37 * t + 2.0).sin()
 }
 
-/// In rings.
+/// Path in rings.
 fn circles(t: f64) -> f64 {
     0.25 + wanders(t)
 }
 
-/// From 0 to 1 between two times.
+/// Ramp from 0 to 1 between two times.
 fn ramp(t: f64, from: f64, to: f64) -> f64 {
     let x = ((t - from) / (to - from)).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)

@@ -115,7 +115,7 @@ fn stamps_that_can_not_be_are_refused_by_name() {
     assert!(fault(|e| e.drift_ppm = f64::NAN).contains("drift_ppm"));
     assert!(fault(|e| e.drop_probability = 1.0).contains("drop_probability"));
     assert!(fault(|e| e.burst_length = 0.5).contains("burst_length"));
-    // Nine of ten lost in single losses can not be.
+    // Nine of ten lost in single losses cannot be.
     assert!(fault(|e| e.drop_probability = 0.9).contains("longer bursts"));
     assert!(StampError::default().check().is_ok());
 }

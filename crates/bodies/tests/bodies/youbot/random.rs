@@ -230,7 +230,7 @@ fn rates_are_those_of_the_pseudo_inverse() {
                 continue;
             }
             let j = arm.jacobian(&q);
-            // Any twist, also what the arm can not do: least squares.
+            // Any twist, also what the arm cannot do: least squares.
             let t = SVector::<f64, 6>::from_fn(|_, _| rng.random_range(-1.0..1.0));
             let twist = Twist {
                 v: strapd_attitude::frames::In::assume(Vector3::new(t[0], t[1], t[2])),

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// Compiles the plan that reads `selection`, and of the batch only the element of this child frame.
 ///
 /// # Errors
-/// A sentence, when a path can not be read from protobuf.
+/// A sentence, when a path cannot be read from protobuf.
 pub(crate) fn samples(
     schema: &Schema,
     selection: &Selection,
@@ -68,7 +68,7 @@ impl<'a> Builder<'a> {
 
     /// Goes to the struct that holds the last field of `path`: its node and that field.
     fn descend(&mut self, path: &[Step]) -> Result<(usize, Leaf), String> {
-        let unreadable = || format!("`{}` can not be read", path_text(self.schema, path));
+        let unreadable = || format!("`{}` cannot be read", path_text(self.schema, path));
         let (mut structure, mut node) = (self.schema.root, 0);
         let mut walked = Vec::new();
         let mut steps = path.iter().peekable();

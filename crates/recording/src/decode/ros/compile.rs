@@ -2,7 +2,7 @@
 //!
 //! Fields of fixed size run together into blocks, so that an Imu is three steps: stamp, frame,
 //! 37 doubles. The compiler knows the position modulo 8 as far as the layout fixes it, and leaves
-//! to the walk only the alignments it can not know, those behind a string or a sequence.
+//! to the walk only the alignments it cannot know, those behind a string or a sequence.
 
 use super::read::Read;
 use super::{Emit, Keep, Mark, Op, Plan};

@@ -265,7 +265,7 @@ impl<'a> Parser<'a> {
             while self.take("[") {
                 let size = self.next();
                 self.expect("]")?;
-                // A constant's name gives no size here: what follows can not be found.
+                // A constant's name gives no size here: what follows cannot be found.
                 many = size
                     .parse()
                     .map_or(Many::Array(u32::MAX), |n| product(many, n));

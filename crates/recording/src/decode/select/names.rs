@@ -304,8 +304,8 @@ pub(crate) enum Px4 {
     VehicleAttitude,
 }
 
-/// The unit of an interval whose name is PX4's: whole numbers count in what it says, and floating-point ones, which older
-/// firmware logged, are seconds.
+/// The unit of an interval whose name is PX4's: whole numbers count in what it says, and floating-point ones, which
+/// older firmware logged, are seconds.
 pub(crate) fn interval_unit(named: TimeUnit, is_float: bool) -> TimeUnit {
     match is_float {
         true => TimeUnit::Second,

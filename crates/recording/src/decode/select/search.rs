@@ -577,7 +577,7 @@ pub(super) fn take_stamp(selection: &mut Selection, stamp: StampFields) {
     }
 }
 
-/// Paths that could fill a role, for the message about one that can not. At most 40.
+/// Paths that could fill a role, for the message about one that cannot. At most 40.
 pub(super) fn available(schema: &Schema, role: FieldRole) -> Vec<String> {
     let mut list = Vec::new();
     for site in sites(schema) {

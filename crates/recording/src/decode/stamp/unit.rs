@@ -52,7 +52,7 @@ impl Bare {
         OUR_TIME.contains(&self.nanos(unit))
     }
 
-    /// So many billionths.
+    /// Makes a bare stamp of so many billionths.
     pub(crate) fn billionths(count: i64) -> Bare {
         Bare(i128::from(count))
     }
@@ -110,7 +110,7 @@ impl Ambiguous {
             fits => format!(": it may be {}", fits.join(" or ")),
         };
         format!(
-            "the unit of a stamp that is a bare number ({}{}) can not be told{may_be}",
+            "the unit of a stamp that is a bare number ({}{}) cannot be told{may_be}",
             number(self.first),
             steps.unwrap_or_default()
         )

@@ -36,7 +36,7 @@ impl Roles<'_> {
             [at] => *at,
             [first, ..] => {
                 return Err(Diagnostic::new(format!(
-                    "the step since the row before may be {}: which is meant can not be told",
+                    "the step since the row before may be {}: which is meant cannot be told",
                     self.listed(&found)
                 ))
                 .help(format!("{COLUMNS} dt={}", self.reference(*first))));
@@ -96,7 +96,7 @@ impl Roles<'_> {
                         false => format!("it may be {}", names.join(" or ")),
                     };
                     Err(Diagnostic::new(format!(
-                        "the unit of the steps in {listed} ({step}) can not be told: {may_be}"
+                        "the unit of the steps in {listed} ({step}) cannot be told: {may_be}"
                     ))
                     .help(help("ms, or :s, :us, :ns")))
                 }

@@ -83,7 +83,7 @@ impl Roles<'_> {
                 match (exact.next(), exact.next()) {
                     (Some(one), None) => Ok(self.of_stamp(one)),
                     _ => Err(Diagnostic::new(format!(
-                        "its stamp may be {}: which is meant can not be told",
+                        "its stamp may be {}: which is meant cannot be told",
                         self.listed(several)
                     ))
                     .help(format!(
@@ -298,7 +298,7 @@ impl Roles<'_> {
             (None, Some(step)) if step <= FINE_TICKS => Ok(TICK),
             (None, Some(step)) if step >= FINE_MICROS => Ok(MICRO),
             _ => Err(Diagnostic::new(format!(
-                "{} counts in 0.1 ms or in us, and which can not be told",
+                "{} counts in 0.1 ms or in us, and which cannot be told",
                 self.listed(&[at])
             ))
             .help(format!(

@@ -1,4 +1,4 @@
-//! Names, units and first rows -> which column is what, or why that can not be told. Pure.
+//! Names, units and first rows -> which column is what, or why that cannot be told. Pure.
 
 use super::super::column::Column;
 use super::super::preamble::{Maker, Preamble};
@@ -123,7 +123,7 @@ impl Roles<'_> {
     /// The table.
     ///
     /// # Errors
-    /// What can not be told, with the flag that tells it.
+    /// What cannot be told, with the flag that tells it.
     pub(super) fn table(&self, header: &[u8], delimiter: Delimiter) -> Result<Table, Diagnostic> {
         let mut notes = Vec::new();
         let gyro = self.chosen(Kind::Gyro, &mut notes)?;
@@ -286,7 +286,7 @@ impl Roles<'_> {
         };
         if let Some([first, second]) = group.twice {
             return Err(Diagnostic::new(format!(
-                "{} is there twice, as columns {} and {}: which of them is meant can not be told",
+                "{} is there twice, as columns {} and {}: which of them is meant cannot be told",
                 self.listed(&[first]),
                 first + 1,
                 second + 1
@@ -422,7 +422,7 @@ impl Roles<'_> {
             _ => format!(", or {COLUMNS} {}=none", kind.name()),
         };
         Diagnostic::new(format!(
-            "its {} may be {}: which is meant can not be told",
+            "its {} may be {}: which is meant cannot be told",
             kind.name(),
             each.join(" or ")
         ))

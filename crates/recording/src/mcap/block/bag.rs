@@ -1,6 +1,7 @@
 //! A chunk of a ROS 1 bag -> the records MCAP has for it. I/O (reads what its caller has).
 //!
-//! Apart because it is told as it is unpacked: what is held is one record and what is told, and it ends where records do.
+//! Apart because it is told as it is unpacked: what is held is one record and what is told, and it ends where records
+//! do.
 
 use super::super::problem::ProblemKind;
 use super::{Compression, PIECE, TOO_MANY, most_messages};
@@ -10,8 +11,8 @@ use std::io::{self, BufRead, Read};
 
 /// Bytes in the largest block of a bzip2 stream of each level.
 const BZIP2_LEVEL: usize = 100_000;
-/// Bytes of a block of bzip2 that a packed one may stand for. Runs of one byte were shortened before, so that an image of
-/// one colour is far below it.
+/// Bytes of a block of bzip2 that a packed one may stand for. Runs of one byte were shortened before, so that an
+/// image of one colour is far below it.
 const BZIP2_BLOCK: usize = 1000;
 
 /// Unpacks a chunk of `length` packed bytes no further than there are records, and tells them. The outer error is the

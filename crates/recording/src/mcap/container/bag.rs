@@ -182,7 +182,7 @@ impl Scanner {
         };
         let (limit, size) = (self.limits.record, u64::from(kept.size));
         if kept.total > limit {
-            // A stream can not be asked whether it is that long, and a file is to give the same.
+            // A stream cannot be asked whether it is that long, and a file is to give the same.
             self.lost(at, kept.total)?;
             return Ok(None);
         }
@@ -388,7 +388,7 @@ impl Scanner {
 /// The connections in a bag's index, for chunks that are lost; none where there is no index that can be read.
 ///
 /// # Errors
-/// Only when the file itself can not be read.
+/// Only when the file itself cannot be read.
 pub(in super::super) fn definitions(file: &Arc<LogFile>, limits: Limits) -> io::Result<Fallback> {
     let mut found = Fallback::default();
     let mut tape = Tape::new(Input::File(Arc::clone(file)), bag::MAGIC.len() as u64);

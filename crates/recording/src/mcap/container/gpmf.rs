@@ -303,7 +303,7 @@ fn find(file: &LogFile, from: u64) -> io::Result<Option<u64>> {
 /// Whether a video has telemetry.
 ///
 /// # Errors
-/// The input can not be read.
+/// The input cannot be read.
 pub(in super::super) fn has_track(file: &LogFile) -> io::Result<bool> {
     Ok(track(file)?.is_ok())
 }
@@ -311,7 +311,7 @@ pub(in super::super) fn has_track(file: &LogFile) -> io::Result<bool> {
 /// The track of telemetry of a video.
 ///
 /// # Errors
-/// The input can not be read; else why there is none, in words.
+/// The input cannot be read; else why there is none, in words.
 fn track(file: &LogFile) -> io::Result<Result<Movie, &'static str>> {
     let found = gpmf::index(file.len, &mut |at, into| file.read_at(into, at))?;
     Ok(found.and_then(|index| Movie::of(&index).ok_or("it has no track of telemetry (gpmd)")))

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Bytes read at most at a time, where pages follow each other.
 const WINDOW: usize = 256 << 10;
 
-/// What is wrong with a frame whose number no transaction gave out.
+/// Fault of a frame whose number no transaction gave out.
 const BEYOND: &str =
     "a page in it lies beyond the size that its transaction commits; it is left out";
 
@@ -47,7 +47,7 @@ impl FilePages {
     /// The pages, and the header as it is committed.
     ///
     /// # Errors
-    /// The input can not be read; else why it is no database, in words.
+    /// The input cannot be read; else why it is no database, in words.
     pub(super) fn open(
         file: Arc<LogFile>,
         beside: Option<Arc<LogFile>>,

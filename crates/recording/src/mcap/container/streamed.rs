@@ -28,11 +28,11 @@ impl Streamed {
         self.tape.position()
     }
 
-    /// Steps until there are `run` bytes of records, or to the end. `step` is given the bytes behind those that were used,
-    /// and whether the log ends with them.
+    /// Steps until there are `run` bytes of records, or to the end. `step` is given the bytes behind those that were
+    /// used, and whether the log ends with them.
     ///
     /// # Errors
-    /// Only when the input itself can not be read.
+    /// Only when the input itself cannot be read.
     pub(super) fn next(
         &mut self,
         run: usize,

@@ -450,7 +450,7 @@ where
     }
 }
 
-/// What a block counts for where it is looked ahead. Not `Block::cost`: this has to be the same for a file and a stream.
+/// Size that a block counts for in the look-ahead. Not `Block::cost`: this has to be the same for a file and a stream.
 fn size(block: &Block) -> usize {
     match block.kind {
         Kind::Chunk { size, .. } | Kind::Bag { size, .. } | Kind::PassedOver { size } => size,

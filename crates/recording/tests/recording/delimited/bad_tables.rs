@@ -146,7 +146,7 @@ fn a_unit_of_stamps_that_the_steps_deny_is_not_believed_and_one_that_is_not_said
     refused(
         "x.csv",
         &named("time", 20.0),
-        &["can not be told", "columns stamp=time:UNIT"],
+        &["cannot be told", "columns stamp=time:UNIT"],
     );
     // One text among them is a bad row, all of them are no stamps.
     refused(
