@@ -645,6 +645,10 @@ mod tests {
             topics: vec![TopicSummary::default()],
             ..RunSummary::default()
         };
+        assert!(run.is_lossy(), "without any attitude all was lost");
+        if let Some(topic) = run.topics.first_mut() {
+            topic.counts.add(Verdict::Accepted);
+        }
         assert!(!run.is_lossy());
         if let Some(topic) = run.topics.first_mut() {
             topic.counts.add(Verdict::Repeated);
