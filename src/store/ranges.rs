@@ -133,7 +133,8 @@ mod tests {
         assert_eq!((cut.first(), cut.len()), (Some(&(0..5)), 1));
         let end = u64::MAX;
         let last = [end - 20..end - 10, end - 5..end];
-        assert_eq!(pieces(&last, end), [end - 20..end]);
+        let whole = end - 20..end;
+        assert_eq!(pieces(&last, end), std::slice::from_ref(&whole));
         // Another order is kept.
         assert_eq!(
             pieces(&[mib..2 * mib, 0..10], 2 * mib),
