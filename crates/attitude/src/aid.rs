@@ -34,7 +34,6 @@
 
 mod aided;
 mod beside;
-mod bounds;
 mod calibration;
 mod covariance;
 mod filter;
@@ -48,6 +47,7 @@ mod residuals;
 mod rest;
 mod settings;
 mod start;
+mod state;
 mod surroundings;
 #[cfg(test)]
 mod tests;

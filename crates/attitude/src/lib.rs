@@ -61,6 +61,7 @@ pub mod digits;
 pub mod estimate;
 pub mod frames;
 pub mod noise;
+pub mod plausible;
 pub mod propagate;
 pub mod quaternion;
 pub mod record;

@@ -12,6 +12,8 @@ mod exp_log;
 mod increments;
 #[doc(hidden)]
 pub mod kernel;
+#[cfg(feature = "serde")]
+pub(crate) mod numbers;
 mod yaw_pitch_roll;
 
 pub use increments::{BodyRate, DeltaAngle, RotationVector};
@@ -38,6 +40,11 @@ impl<To, From> Clone for Quaternion<To, From> {
     }
 }
 impl<To, From> Copy for Quaternion<To, From> {}
+impl<To, From> Default for Quaternion<To, From> {
+    fn default() -> Self {
+        Quaternion::identity()
+    }
+}
 /// The same four numbers; q and -q are the same attitude but not equal.
 impl<To, From> PartialEq for Quaternion<To, From> {
     fn eq(&self, other: &Self) -> bool {

@@ -74,18 +74,26 @@ pub struct Aided {
     anew: Option<Start>,
     /// The attitude is not that of this stream's beginning, but one that was saved.
     pub(super) is_resumed: bool,
-    /// Specific forces that do not come with the gyro samples.
-    pub(super) forces: Option<Beside>,
-    pub(super) fields: Beside,
-    /// Samples given to the propagator, whose attitudes have not come out yet.
-    pub(super) given: VecDeque<Given>,
-    pub(super) last: Option<Nanos>,
+    pub(super) stream: StreamState,
     /// Samples that go into the propagator at once, and what comes out of it.
     corrected: Vec<RateSample>,
     scratch: Vec<AttitudeSample>,
-    pub(super) last_out: Option<Quaternion<Nav, Body>>,
     /// Innovations, if somebody looks at them.
     innovations: Option<Vec<(Nanos, Innovation)>>,
+}
+
+/// State of an [`Aided`] beside those of its propagator and its filter: what is on its way between them.
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct StreamState {
+    /// Samples given to the propagator, whose attitudes have not come out yet.
+    pub(super) given: VecDeque<Given>,
+    pub(super) last: Option<Nanos>,
+    /// The last attitude, w, x, y, z.
+    pub(super) last_out: Option<[f64; 4]>,
+    /// Specific forces that do not come with the gyro samples.
+    pub(super) forces: Option<Beside>,
+    pub(super) fields: Beside,
 }
 
 /// A sample and what it was corrected by.
@@ -122,13 +130,15 @@ impl Aided {
             begins: start,
             anew: None,
             is_resumed: false,
-            forces: None,
-            fields: Beside::with_repeats(),
-            given: VecDeque::new(),
-            last: None,
+            stream: StreamState {
+                given: VecDeque::new(),
+                last: None,
+                last_out: None,
+                forces: None,
+                fields: Beside::with_repeats(),
+            },
             corrected: Vec::new(),
             scratch: Vec::new(),
-            last_out: None,
             innovations: None,
         })
     }
@@ -155,25 +165,25 @@ impl Aided {
 
     /// Whether they do.
     pub(crate) fn has_forces_beside(&self) -> bool {
-        self.forces.is_some()
+        self.stream.forces.is_some()
     }
 
     /// Expects forces on a topic of their own from now on, as after [`Aided::with_forces_beside`].
     pub fn expect_forces_beside(&mut self) {
-        self.forces.get_or_insert_default();
+        self.stream.forces.get_or_insert_default();
     }
 
     /// Takes a specific force (m/s^2) measured at `stamp`: it is used at the first gyro sample at or
     /// after that, turned on by the rate. One that is half a second from any is counted and not used.
     pub fn take_force(&mut self, stamp: Nanos, force: In<Body>) {
-        if let Some(forces) = &mut self.forces {
+        if let Some(forces) = &mut self.stream.forces {
             forces.take(stamp, *force.as_vector());
         }
     }
 
     /// The same for a magnetic field, any linear unit.
     pub fn take_field(&mut self, stamp: Nanos, field: In<Body>) {
-        self.fields.take(stamp, *field.as_vector());
+        self.stream.fields.take(stamp, *field.as_vector());
     }
 
     /// The filter, for what it has learned.
@@ -237,18 +247,18 @@ impl Aided {
     fn alike(&self, samples: &[RateSample]) -> usize {
         let latency = self.propagator.latency();
         // The first of a run comes out at once.
-        if !self.filter.is_started() || (latency > 0 && self.given.is_empty()) {
+        if !self.filter.is_started() || (latency > 0 && self.stream.given.is_empty()) {
             return 1;
         }
-        let mut last = self.last;
+        let mut last = self.stream.last;
         let new = samples.iter().map(|sample| {
             let before = last.replace(sample.stamp).unwrap_or(sample.stamp);
             sample.stamp.secs_since(before)
         });
-        let given = self.given.iter().map(|given| given.measured.secs);
+        let given = self.stream.given.iter().map(|given| given.measured.secs);
         let mut due = self.filter.due();
         // The attitude of each comes out no earlier than when so many samples more have been given.
-        let waits = self.given.len();
+        let waits = self.stream.given.len();
         let known = given
             .chain(new)
             .position(|secs| due.comes(secs))
@@ -263,27 +273,32 @@ impl Aided {
     pub fn finish(&mut self, out: &mut Vec<AttitudeSample>) {
         self.propagator.finish(&Sequential, &mut self.scratch);
         self.correct(out);
-        self.fields.finish();
-        if let Some(forces) = &mut self.forces {
+        self.stream.fields.finish();
+        if let Some(forces) = &mut self.stream.forces {
             forces.finish();
         }
-        self.filter.count_beside(self.forces.as_ref(), &self.fields);
+        self.filter
+            .count_beside(self.stream.forces.as_ref(), &self.stream.fields);
     }
 
     /// The sample as the propagator is to have it.
     fn give(&mut self, sample: &RateSample) -> RateSample {
         let applied = self.filter.applied();
-        let secs = self.last.map_or(0.0, |last| sample.stamp.secs_since(last));
-        self.last = Some(sample.stamp);
+        let secs = self
+            .stream
+            .last
+            .map_or(0.0, |last| sample.stamp.secs_since(last));
+        self.stream.last = Some(sample.stamp);
         let BodyRate(rate) = sample.mean_rate();
         let turning = applied.corrected(rate, 1.0);
-        let force = match &mut self.forces {
+        let force = match &mut self.stream.forces {
             None => sample.accel.map(|force| *force.as_vector()),
             Some(forces) => forces.at(sample.stamp, &turning),
         };
-        let field = self.fields.at(sample.stamp, &turning);
-        self.filter.count_beside(self.forces.as_ref(), &self.fields);
-        self.given.push_back(Given {
+        let field = self.stream.fields.at(sample.stamp, &turning);
+        self.filter
+            .count_beside(self.stream.forces.as_ref(), &self.stream.fields);
+        self.stream.given.push_back(Given {
             stamp: sample.stamp,
             measured: Measured {
                 secs,
@@ -308,23 +323,29 @@ impl Aided {
         let mut scratch = std::mem::take(&mut self.scratch);
         for sample in &scratch {
             // Of one that was recalled: what its propagator does not know belongs to nothing.
-            while self.given.front().is_some_and(|g| g.stamp < sample.stamp) {
-                self.given.pop_front();
+            while self
+                .stream
+                .given
+                .front()
+                .is_some_and(|g| g.stamp < sample.stamp)
+            {
+                self.stream.given.pop_front();
             }
             let is_first = self
+                .stream
                 .given
                 .front()
                 .is_some_and(|given| given.stamp == sample.stamp);
             let (mut q_nb, mut r) = self.filter.corrected(&sample.q_nb);
             if is_first
-                && let Some(given) = self.given.pop_front()
+                && let Some(given) = self.stream.given.pop_front()
                 && self.take(&given, sample, &r)
             {
                 (q_nb, r) = self.filter.corrected(&sample.q_nb);
             }
             let status = sample.status.with(self.filter.status());
-            if let Some(last) = &self.last_out {
-                q_nb = q_nb.same_sign_as(last);
+            if let Some(last) = self.stream.last_out {
+                q_nb = q_nb.same_sign_as(&Quaternion::assume_unit(last));
             }
             let corrected = AttitudeSample {
                 q_nb,
@@ -332,7 +353,7 @@ impl Aided {
                 covariance: self.filter.attitude_covariance(&r, &sample.rate.0),
                 ..*sample
             };
-            self.last_out = Some(q_nb);
+            self.stream.last_out = Some(q_nb.wxyz());
             out.push(corrected);
         }
         scratch.clear();
@@ -382,7 +403,7 @@ impl Aided {
         if let Some(innovations) = &mut self.innovations
             && has_corrected
         {
-            innovations.push((given.stamp, self.filter.innovation));
+            innovations.push((given.stamp, self.filter.derived.innovation));
         }
         has_corrected
     }

@@ -3,8 +3,8 @@
 //! Apart from the filter because a magnetometer, and an accelerometer in messages of its own, are slower or
 //! faster than the gyro, come late, or run on another clock; the filter is to see what fits and nothing else.
 
-use super::bounds::LARGEST;
 use crate::frames::Body;
+use crate::plausible::are_numbers;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::Nanos;
 use nalgebra::Vector3;
@@ -66,8 +66,7 @@ impl Beside {
 
     /// Whether it can have come about.
     pub(super) fn is_bounded(&self) -> bool {
-        let is_number = |(_, v): &(Nanos, Vector3<f64>)| v.iter().all(|v| v.abs() <= LARGEST);
-        self.waiting.len() <= MOST && self.waiting.iter().all(is_number)
+        self.waiting.len() <= MOST && self.waiting.iter().all(|(_, vector)| are_numbers(vector))
     }
 
     /// Ends it: no gyro sample follows.

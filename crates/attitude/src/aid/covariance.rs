@@ -1,5 +1,6 @@
 //! Covariance of the error states: a step on, a scalar measurement, a restart. Pure.
 
+use crate::plausible::LARGEST;
 use nalgebra::{Matrix3, Vector3};
 
 /// Error states: tilt x, y and heading (rad, earth axes), velocity x, y, position x, y, gyro bias, scale, cross,
@@ -65,6 +66,13 @@ pub(super) struct Covariance {
     rows: [[f64; WIDTH]; WIDTH],
     /// Number of states: [`STATES`], or all.
     states: usize,
+}
+
+impl Default for Covariance {
+    /// Every state known.
+    fn default() -> Covariance {
+        Covariance::zero(false)
+    }
 }
 
 /// The rows of its lower half, one after the other.
@@ -287,7 +295,7 @@ impl Covariance {
         let within = |i: usize, j: usize| {
             self.rows[i][j].powi(2) <= self.rows[i][i] * self.rows[j][j] * (1.0 + 1e-9)
         };
-        let is_small = |i: usize| self.rows[i][i] <= super::bounds::LARGEST;
+        let is_small = |i: usize| self.rows[i][i] <= LARGEST;
         self.is_sound()
             && (0..self.states).all(is_small)
             && (0..self.states).all(|i| (0..i).all(|j| within(i, j)))

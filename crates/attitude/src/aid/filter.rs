@@ -2,13 +2,10 @@
 
 use super::beside::Beside;
 use super::calibration::{Applied, Calibration};
-use super::covariance::{BIAS, CROSS, Covariance, FORCE_BIAS, IRON, LEAD, SCALE, TILT};
+use super::covariance::{BIAS, CROSS, FORCE_BIAS, IRON, LEAD, SCALE, TILT};
 use super::interval::Interval;
-use super::plausibility::Plausibility;
-use super::residuals::Residuals;
-use super::rest::Rest;
 use super::settings::Settings;
-use super::surroundings::Surroundings;
+use super::state::State;
 use super::vertical::Vertical;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
@@ -95,43 +92,19 @@ pub struct Filter {
     pub(super) is_instant: bool,
     /// Rate of the world, rad/s, earth axes.
     pub(super) world_rate: Vector3<f64>,
-    /// Whether tilt and heading have begun.
-    pub(super) is_started: bool,
-    pub(super) covariance: Covariance,
-    pub(super) calibration: Calibration,
+    pub(super) state: State,
+    pub(super) derived: Derived,
+}
+
+/// Values that follow from the state, or are of the last sample alone: none of them is saved.
+#[derive(Clone, Debug)]
+pub(super) struct Derived {
+    /// The calibration, as rates are corrected by it.
     pub(super) known: Applied,
-    /// Rotation of the propagator's attitude, from the left.
-    pub(super) correction: Quaternion<Nav, Nav>,
-    /// Velocity and position of the motion, horizontal, m/s and m.
-    pub(super) velocity: [f64; 2],
-    pub(super) position: [f64; 2],
-    /// Disturbance of the field's heading, rad.
-    pub(super) disturbance: f64,
-    pub(super) interval: Interval,
-    pub(super) rest: Rest,
-    pub(super) residuals: Residuals,
-    pub(super) mean_acceleration: Vector3<f64>,
-    /// The vertical in the interval before, body axes.
-    pub(super) last_up: Option<Vector3<f64>>,
-    pub(super) vertical: Vertical,
-    pub(super) surroundings: Surroundings,
-    /// A gap has been too long for the tilt to be known.
-    pub(super) wants_level: bool,
-    /// Time between samples, s; 0 before it is known.
-    pub(super) nominal: f64,
-    pub(super) gaps_in_a_row: u32,
-    pub(super) last_rate: Vector3<f64>,
-    /// The last specific force, earth axes, and how long ago it was, s.
-    pub(super) last_force: Option<Vector3<f64>>,
-    pub(super) since_force: f64,
-    pub(super) plausibility: Plausibility,
     /// Whether it was levelled since the sample before.
     pub(super) has_levelled: bool,
-    /// The gyro was found to be none of its class, and its scale and axes are looked for farther off.
-    pub(super) is_widened: bool,
     /// Innovation of the last correction.
     pub(super) innovation: Innovation,
-    pub(super) report: Report,
 }
 
 impl Filter {
@@ -139,37 +112,16 @@ impl Filter {
     /// before, in a world that turns at `world_rate` (rad/s).
     #[must_use]
     pub(crate) fn new(settings: Settings, is_instant: bool, world_rate: In<Nav>) -> Filter {
-        let calibration = Calibration::default();
         let mut filter = Filter {
             settings,
             is_instant,
             world_rate: *world_rate.as_vector(),
-            is_started: false,
-            covariance: Covariance::zero(false),
-            calibration,
-            known: Applied::of(&calibration),
-            correction: Quaternion::identity(),
-            velocity: [0.0; 2],
-            position: [0.0; 2],
-            disturbance: 0.0,
-            interval: Interval::new(),
-            rest: Rest::new(Vector3::zeros()),
-            residuals: Residuals::new(&settings),
-            mean_acceleration: Vector3::zeros(),
-            last_up: None,
-            vertical: Vertical::default(),
-            surroundings: Surroundings::default(),
-            wants_level: false,
-            nominal: 0.0,
-            gaps_in_a_row: 0,
-            last_rate: Vector3::zeros(),
-            last_force: None,
-            since_force: 0.0,
-            plausibility: Plausibility::default(),
-            has_levelled: false,
-            is_widened: false,
-            innovation: Innovation::NONE,
-            report: Report::default(),
+            state: State::default(),
+            derived: Derived {
+                known: Applied::of(&Calibration::default()),
+                has_levelled: false,
+                innovation: Innovation::NONE,
+            },
         };
         filter.forget_calibration();
         filter
@@ -178,21 +130,21 @@ impl Filter {
     /// Calibration of the sensor by now.
     #[must_use]
     pub fn calibration(&self) -> &Calibration {
-        &self.calibration
+        &self.state.calibration
     }
 
     /// One standard deviation of each number of the calibration.
     #[must_use]
     pub fn calibration_sigma(&self) -> Calibration {
         let three = |first: usize| {
-            Vector3::from_fn(|i, _| self.covariance.variance(first + i).max(0.0).sqrt())
+            Vector3::from_fn(|i, _| self.state.covariance.variance(first + i).max(0.0).sqrt())
         };
         Calibration {
             bias: three(BIAS),
             scale: three(SCALE),
             cross: three(CROSS),
             force_bias: three(FORCE_BIAS),
-            lead: self.covariance.variance(LEAD).max(0.0).sqrt(),
+            lead: self.state.covariance.variance(LEAD).max(0.0).sqrt(),
             hard_iron: three(IRON),
         }
     }
@@ -205,14 +157,14 @@ impl Filter {
     #[must_use]
     pub fn is_beyond_class(&self) -> bool {
         let settings = &self.settings;
-        let is_force = self.calibration.force_bias.amax() > 3.0 * settings.force_bias_prior;
-        self.is_widened
+        let is_force = self.state.calibration.force_bias.amax() > 3.0 * settings.force_bias_prior;
+        self.state.is_widened
             || self.is_gyro_beyond_class()
             || (is_force && settings.prior.force_bias.is_none())
     }
 
     fn is_gyro_beyond_class(&self) -> bool {
-        let (settings, found) = (&self.settings, &self.calibration);
+        let (settings, found) = (&self.settings, &self.state.calibration);
         settings.prior.scale.is_none()
             && (found.scale.amax() > 2.0 * settings.scale_prior
                 || found.cross.amax() > 2.0 * settings.cross_prior)
@@ -220,10 +172,10 @@ impl Filter {
 
     /// Looks for the gyro's scale and axes farther off, once it was found to be none of its class.
     pub(super) fn widen(&mut self) {
-        if self.is_widened || !self.is_gyro_beyond_class() {
+        if self.state.is_widened || !self.is_gyro_beyond_class() {
             return;
         }
-        self.is_widened = true;
+        self.state.is_widened = true;
         let Settings {
             scale_prior,
             cross_prior,
@@ -232,7 +184,7 @@ impl Filter {
         for (first, prior) in [(SCALE, scale_prior), (CROSS, cross_prior)] {
             let more = (WIDE * WIDE - prior * prior).max(0.0);
             for axis in 0..3 {
-                self.covariance.add(first + axis, more);
+                self.state.covariance.add(first + axis, more);
             }
         }
     }
@@ -240,7 +192,7 @@ impl Filter {
     /// Covariance of the calibration's numbers from state `first` on, as much larger than the filter's own as that
     /// of the attitude.
     fn block<const N: usize>(&self, first: usize) -> SMatrix<f64, N, N> {
-        SMatrix::from_fn(|i, j| COLOURED * self.covariance.between(first + i, first + j))
+        SMatrix::from_fn(|i, j| COLOURED * self.state.covariance.between(first + i, first + j))
     }
 
     /// Covariances of the gyro's bias, (rad/s)^2; of its scale and axes; of the accelerometer's bias, (m/s^2)^2. Body
@@ -256,8 +208,9 @@ impl Filter {
 
     /// Covariance of hard iron, if it is looked for, and what it was taken for at the start, in the field's unit.
     pub(crate) fn hard_iron_covariance(&self) -> Option<(Matrix3<f64>, f64)> {
-        let prior = self.settings.hard_iron * self.surroundings.mean_norm();
-        self.covariance
+        let prior = self.settings.hard_iron * self.state.surroundings.mean_norm();
+        self.state
+            .covariance
             .has_iron()
             .then(|| (self.block(IRON), prior))
     }
@@ -271,8 +224,8 @@ impl Filter {
     pub(crate) fn lead_prior(&self) -> f64 {
         let settings = &self.settings;
         // The second part is added by the first correction.
-        let share = if self.report.updates > 0 {
-            settings.lead_share * self.nominal
+        let share = if self.state.report.updates > 0 {
+            settings.lead_share * self.state.nominal
         } else {
             0.0
         };
@@ -282,14 +235,14 @@ impl Filter {
 
     /// Calibration by which the rates that come now are to be corrected.
     pub(crate) fn applied(&self) -> Applied {
-        self.known
+        self.derived.known
     }
 
     /// Whether nothing has told the gyro's bias about the vertical: the body has turned about its vertical axis only
     /// and has not rested, so that its sigma is most of what it was at the start, and heading drifts by it.
     #[must_use]
     pub fn is_bias_unobserved(&self) -> bool {
-        let (main, withheld) = self.vertical.withheld();
+        let (main, withheld) = self.state.vertical.withheld();
         let (now, first) = (self.calibration_covariance().0, &self.settings);
         let prior = match &first.prior.bias {
             Some(known) => main.dot(&(known * main)),
@@ -308,44 +261,44 @@ impl Filter {
     /// Report of what happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
-        self.report
+        self.state.report
     }
 
     /// Counts vectors that were measured on topics of their own.
     pub(super) fn count_beside(&mut self, forces: Option<&Beside>, fields: &Beside) {
-        self.report.fields = fields.paired;
-        self.report.fields_unpaired = fields.unpaired + fields.not_finite;
-        self.report.forces_unpaired =
+        self.state.report.fields = fields.paired;
+        self.state.report.fields_unpaired = fields.unpaired + fields.not_finite;
+        self.state.report.forces_unpaired =
             forces.map_or(0, |forces| forces.unpaired + forces.not_finite);
     }
 
     /// Whether the sensor has been at rest for long enough to say so.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        self.is_started && self.rests()
+        self.state.is_started && self.rests()
     }
 
     /// The same for the filter itself, which asks only when it has begun.
     pub(super) fn rests(&self) -> bool {
-        self.rest.is_quiet(&self.settings) && self.since_force <= FORCE_SECS
+        self.state.rest.is_quiet(&self.settings) && self.state.since_force <= FORCE_SECS
     }
 
     /// Whether what was taken for a specific force was found to be none: nothing is corrected by it.
     #[must_use]
     pub fn is_force_implausible(&self) -> bool {
-        self.plausibility.is_denied()
+        self.state.plausibility.is_denied()
     }
 
     /// Status of an attitude, which is that of the last sample it took.
     pub(crate) fn status(&self) -> Status {
-        if !self.is_started || self.is_force_implausible() {
+        if !self.state.is_started || self.is_force_implausible() {
             return Status::OK;
         }
         let mut status = Status::AIDED;
         if self.rests() {
             status = status.with(Status::REST);
         }
-        if self.has_levelled {
+        if self.derived.has_levelled {
             status = status.with(Status::LEVELLED);
         }
         status
@@ -354,7 +307,7 @@ impl Filter {
     /// Whether tilt is known: a specific force has come.
     #[must_use]
     pub fn is_started(&self) -> bool {
-        self.is_started
+        self.state.is_started
     }
 
     /// The attitude that the propagator's is, and its matrix.
@@ -364,14 +317,14 @@ impl Filter {
         &self,
         propagated: &Quaternion<Nav, Body>,
     ) -> (Quaternion<Nav, Body>, Matrix3<f64>) {
-        let attitude = self.correction * *propagated;
+        let attitude = self.state.correction * *propagated;
         (attitude.normalised(), *attitude.to_dcm().as_matrix())
     }
 
     /// Time of the next correction.
     pub(crate) fn due(&self) -> Due {
         Due {
-            secs: self.interval.secs,
+            secs: self.state.interval.secs,
             update_secs: self.settings.update_secs,
         }
     }
@@ -380,46 +333,48 @@ impl Filter {
     /// matrix of its attitude, corrected, at the sample's instant. Whether that has been corrected further.
     pub(crate) fn take(&mut self, sample: &Measured, known: &Applied, r: &Matrix3<f64>) -> bool {
         let secs = sample.secs;
-        self.has_levelled = false;
-        let is_gap = self.nominal > 0.0 && secs > self.settings.gap_factor * self.nominal;
+        self.derived.has_levelled = false;
+        let is_gap =
+            self.state.nominal > 0.0 && secs > self.settings.gap_factor * self.state.nominal;
         let rate = if is_gap || self.is_instant {
-            0.5 * (sample.rate + self.last_rate)
+            0.5 * (sample.rate + self.state.last_rate)
         } else {
             sample.rate
         };
-        self.interval.turn(secs, r, &rate, known);
+        self.state.interval.turn(secs, r, &rate, known);
         let at_instant = if self.is_instant { sample.rate } else { rate };
         let force = self.add_force(sample, r, known.corrected(at_instant, 1.0), is_gap);
         if let Some(field) = sample.field.filter(is_field) {
             let field = self.less_iron(field);
-            self.interval.field += r * field;
-            if self.covariance.has_iron() {
-                self.interval.field_in_body += field;
-                self.interval.by_iron += r.row(0).transpose();
+            self.state.interval.field += r * field;
+            if self.state.covariance.has_iron() {
+                self.state.interval.field_in_body += field;
+                self.state.interval.by_iron += r.row(0).transpose();
             }
-            self.interval.fields += 1.0;
+            self.state.interval.fields += 1.0;
         }
-        let sigma = |axis: usize| self.covariance.variance(BIAS + axis).max(0.0).sqrt();
-        let bias = (&self.calibration.bias, sigma);
-        self.rest
+        let sigma = |axis: usize| self.state.covariance.variance(BIAS + axis).max(0.0).sqrt();
+        let bias = (&self.state.calibration.bias, sigma);
+        self.state
+            .rest
             .take(secs, &rate, force.as_ref(), bias, &self.settings);
         self.doubt_turn(sample, is_gap);
-        self.last_rate = sample.rate;
+        self.state.last_rate = sample.rate;
         if !is_gap {
-            self.gaps_in_a_row = 0;
-            self.nominal = if self.nominal > 0.0 {
-                self.nominal + 0.05 * (secs - self.nominal)
+            self.state.gaps_in_a_row = 0;
+            self.state.nominal = if self.state.nominal > 0.0 {
+                self.state.nominal + 0.05 * (secs - self.state.nominal)
             } else {
                 secs
             };
         } else {
-            self.gaps_in_a_row += 1;
-            if self.gaps_in_a_row >= GAPS_IN_A_ROW {
-                self.nominal = secs;
-                self.gaps_in_a_row = 0;
+            self.state.gaps_in_a_row += 1;
+            if self.state.gaps_in_a_row >= GAPS_IN_A_ROW {
+                self.state.nominal = secs;
+                self.state.gaps_in_a_row = 0;
             }
         }
-        let is_due = is_due(self.interval.secs, secs, self.settings.update_secs);
+        let is_due = is_due(self.state.interval.secs, secs, self.settings.update_secs);
         if is_due {
             self.update();
         }
@@ -428,17 +383,17 @@ impl Filter {
 
     /// The propagator held the attitude over `secs` of which nothing is known.
     pub(crate) fn hold(&mut self, sample: &Measured) {
-        self.interval = Interval::new();
-        self.last_force = None;
-        self.has_levelled = false;
+        self.state.interval = Interval::default();
+        self.state.last_force = None;
+        self.derived.has_levelled = false;
         // A clock that was set back does not say how long it was.
         let secs = sample.secs.max(0.0);
         let walk = self.settings.bias_walk.powi(2) * secs;
         for axis in 0..3 {
-            self.covariance.add(BIAS + axis, walk);
+            self.state.covariance.add(BIAS + axis, walk);
         }
         self.lose_sight(sample, secs);
-        self.last_rate = sample.rate;
+        self.state.last_rate = sample.rate;
     }
 
     /// The force of a sample in the sums; what of it can be used.
@@ -449,21 +404,23 @@ impl Filter {
         rate: Vector3<f64>,
         is_gap: bool,
     ) -> Option<Vector3<f64>> {
-        self.since_force += sample.secs;
+        self.state.since_force += sample.secs;
         let measured = sample.force?;
-        if self.plausibility.is_denied() {
+        if self.state.plausibility.is_denied() {
             return None;
         }
         if !self.is_force(&measured) {
-            self.report.forces_rejected += 1;
+            self.state.report.forces_rejected += 1;
             return None;
         }
         // It stands for the time since the one before it.
         let secs = self
+            .state
             .since_force
             .min(sample.secs.max(self.settings.update_secs));
-        self.since_force = 0.0;
+        self.state.since_force = 0.0;
         if self
+            .state
             .plausibility
             .denies(secs, &(r * measured), self.settings.gravity)
         {
@@ -471,60 +428,68 @@ impl Filter {
             return None;
         }
         let turning = rate.cross(&measured);
-        let force = r * (measured - self.calibration.force_bias + turning * self.calibration.lead);
-        let mean = match self.last_force {
+        let force = r
+            * (measured - self.state.calibration.force_bias
+                + turning * self.state.calibration.lead);
+        let mean = match self.state.last_force {
             Some(last) if is_gap => 0.5 * (force + last),
             _ => force,
         };
-        self.last_force = Some(force);
-        self.interval.force += mean * secs;
-        self.interval.lead += r * turning * secs;
-        self.interval.force_secs += secs;
+        self.state.last_force = Some(force);
+        self.state.interval.force += mean * secs;
+        self.state.interval.lead += r * turning * secs;
+        self.state.interval.force_secs += secs;
         Some(measured)
     }
 
     /// Adds what a gap, a jump or the end of the gyro's range leaves unknown of a rotation.
     fn doubt_turn(&mut self, sample: &Measured, is_gap: bool) {
         let secs = sample.secs;
-        let jump = sample.rate - self.last_rate;
+        let jump = sample.rate - self.state.last_rate;
         if is_gap {
             let jump = jump.norm();
-            self.report.gaps += 1;
-            self.covariance
+            self.state.report.gaps += 1;
+            self.state
+                .covariance
                 .add_to_attitude(jump * jump * secs * secs / 36.0);
             if secs > self.settings.gap_secs {
                 self.lose_sight(sample, secs - self.settings.gap_secs);
             }
         }
-        let ordinary = if is_gap || self.nominal <= 0.0 {
+        let ordinary = if is_gap || self.state.nominal <= 0.0 {
             secs
         } else {
-            self.nominal
+            self.state.nominal
         };
         let most = self.settings.jerk * ordinary;
         if jump.norm_squared() > most * most {
             let excess = jump.norm() - most;
-            self.covariance.add_to_attitude((excess * secs).powi(2));
+            self.state
+                .covariance
+                .add_to_attitude((excess * secs).powi(2));
         }
         let range = self.settings.gyro_range;
         if range > 0.0 && sample.rate.amax() >= range {
-            self.report.saturated += 1;
+            self.state.report.saturated += 1;
             for rate in sample.rate.iter().filter(|rate| rate.abs() >= range) {
-                self.covariance.add_to_attitude((0.5 * rate * secs).powi(2));
+                self.state
+                    .covariance
+                    .add_to_attitude((0.5 * rate * secs).powi(2));
             }
         }
     }
 
     /// Nothing is known of what the body did for `secs`.
     fn lose_sight(&mut self, sample: &Measured, secs: f64) {
-        let fastest = |i: usize| sample.rate[i].powi(2).max(self.last_rate[i].powi(2));
+        let fastest = |i: usize| sample.rate[i].powi(2).max(self.state.last_rate[i].powi(2));
         let squared: f64 = (0..3).map(fastest).sum();
         let unknown = ((squared / 3.0 + 0.01) * secs * secs).min(3.0);
-        self.covariance.add_to_attitude(unknown);
-        self.wants_level |= self.covariance.variance(TILT) > self.settings.level_sigma.powi(2);
+        self.state.covariance.add_to_attitude(unknown);
+        self.state.wants_level |=
+            self.state.covariance.variance(TILT) > self.settings.level_sigma.powi(2);
         self.restart_reference(1.0, 1.0);
-        self.rest.interrupt();
-        self.vertical = Vertical::default();
+        self.state.rest.interrupt();
+        self.state.vertical = Vertical::default();
     }
 
     pub(super) fn is_force(&self, force: &Vector3<f64>) -> bool {

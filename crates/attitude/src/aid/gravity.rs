@@ -25,15 +25,15 @@ pub(super) struct Force {
 impl Filter {
     /// Mean acceleration over the last seconds. Levels where that says that down is up.
     pub(super) fn judge_tilt(&mut self, force: &Force) -> bool {
-        let secs = self.interval.secs;
-        self.mean_acceleration +=
-            (force.acceleration - self.mean_acceleration) * (secs / (MEAN_SECS + secs));
+        let secs = self.state.interval.secs;
+        self.state.mean_acceleration +=
+            (force.acceleration - self.state.mean_acceleration) * (secs / (MEAN_SECS + secs));
         let gravity = Vector3::z() * self.settings.gravity;
-        if self.wants_level && self.level(force.acceleration + gravity) {
-            self.wants_level = false;
+        if self.state.wants_level && self.level(force.acceleration + gravity) {
+            self.state.wants_level = false;
             return true;
         }
-        let mean = self.mean_acceleration + gravity;
+        let mean = self.state.mean_acceleration + gravity;
         // The linear correction has a false equilibrium upside down.
         mean.z < 0.0 && self.level(mean)
     }
@@ -41,10 +41,11 @@ impl Filter {
     /// The measurement of tilt.
     pub(super) fn use_gravity(&mut self, force: &Force, correction: &mut Correction) {
         let settings = self.settings;
-        let secs = self.interval.secs;
+        let secs = self.state.interval.secs;
         for i in 0..2 {
-            self.position[i] += secs * self.velocity[i] + 0.5 * secs * secs * force.acceleration[i];
-            self.velocity[i] += secs * force.acceleration[i];
+            self.state.position[i] +=
+                secs * self.state.velocity[i] + 0.5 * secs * secs * force.acceleration[i];
+            self.state.velocity[i] += secs * force.acceleration[i];
         }
         if self.reference_is_left() && self.leave_reference() {
             return;
@@ -52,21 +53,25 @@ impl Filter {
         let by_velocity = 2.0 * settings.motion_damping * settings.motion_frequency;
         let by_position = settings.motion_frequency * settings.motion_frequency;
         let residual = [0, 1].map(|i| {
-            force.acceleration[i] + by_velocity * self.velocity[i] + by_position * self.position[i]
+            force.acceleration[i]
+                + by_velocity * self.state.velocity[i]
+                + by_position * self.state.position[i]
         });
-        let mut variance = self
-            .residuals
-            .variance(secs, residual, force.acceleration.z, &settings);
+        let mut variance =
+            self.state
+                .residuals
+                .variance(secs, residual, force.acceleration.z, &settings);
         if self.rests() {
             let (ax, ay) = (force.acceleration.x, force.acceleration.y);
             let square = ax * ax + ay * ay;
-            let tilt = self.covariance.variance(TILT) + self.covariance.variance(TILT + 1);
+            let tilt =
+                self.state.covariance.variance(TILT) + self.state.covariance.variance(TILT + 1);
             let floor = settings.force_floor / secs;
             if square > 9.0 * (force.up * force.up * tilt + 2.0 * floor + 0.09) {
                 // A wrong tilt at rest is found in a second.
                 let unknown = 0.1 * square / settings.gravity.powi(2);
-                self.covariance.add(TILT, unknown);
-                self.covariance.add(TILT + 1, unknown);
+                self.state.covariance.add(TILT, unknown);
+                self.state.covariance.add(TILT + 1, unknown);
                 variance = floor + 0.01;
             }
         }
@@ -83,29 +88,29 @@ impl Filter {
                 (VELOCITY + i, by_velocity),
                 (POSITION + i, by_position),
             ];
-            let (left, sigma) = self.covariance.measure_withholding(
+            let (left, sigma) = self.state.covariance.measure_withholding(
                 &h,
                 -residual[i],
                 variance,
-                self.vertical.withheld(),
+                self.state.vertical.withheld(),
                 correction,
             );
             let gravity = settings.gravity;
-            self.innovation.gravity[i] = (left / gravity, sigma / gravity);
+            self.derived.innovation.gravity[i] = (left / gravity, sigma / gravity);
         }
     }
 
     fn reference_is_left(&self) -> bool {
         let limit = self.settings.reference_limit.powi(2);
         let squared = |v: [f64; 2]| v[0] * v[0] + v[1] * v[1];
-        squared(self.velocity) > limit || squared(self.position) > limit
+        squared(self.state.velocity) > limit || squared(self.state.position) > limit
     }
 
     /// Velocity or position are beyond what a held body has: either the tilt is wrong (the mean specific force
     /// is as long as gravity), or it really travels. Whether it was levelled.
     fn leave_reference(&mut self) -> bool {
         let gravity = self.settings.gravity;
-        let mean = self.mean_acceleration;
+        let mean = self.state.mean_acceleration;
         let across = mean.x.hypot(mean.y);
         let force = mean + Vector3::z() * gravity;
         let length = force.norm();
@@ -122,12 +127,12 @@ impl Filter {
 
     /// A velocity and position that are known to these variances and nothing more.
     pub(super) fn restart_reference(&mut self, velocity: f64, position: f64) {
-        self.report.restarts += 1;
-        (self.velocity, self.position) = ([0.0; 2], [0.0; 2]);
+        self.state.report.restarts += 1;
+        (self.state.velocity, self.state.position) = ([0.0; 2], [0.0; 2]);
         for i in 0..2 {
-            self.covariance.restart(VELOCITY + i, velocity);
-            self.covariance.restart(POSITION + i, position);
+            self.state.covariance.restart(VELOCITY + i, velocity);
+            self.state.covariance.restart(POSITION + i, position);
         }
-        self.residuals.restart();
+        self.state.residuals.restart();
     }
 }

@@ -36,34 +36,34 @@ impl Filter {
     /// Quality of the field; `None` before the first.
     #[must_use]
     pub fn field(&self) -> Option<FieldQuality> {
-        let Field { norm, dip } = self.surroundings.reference?;
+        let Field { norm, dip } = self.state.surroundings.reference?;
         Some(FieldQuality {
             norm,
             dip,
-            deviation: self.surroundings.deviation.max(0.0).sqrt(),
+            deviation: self.state.surroundings.deviation.max(0.0).sqrt(),
         })
     }
 
     /// A field without what is known of hard iron, whose uncertainty begins with the first.
     pub(super) fn less_iron(&mut self, field: Vector3<f64>) -> Vector3<f64> {
-        if !self.covariance.has_iron() {
+        if !self.state.covariance.has_iron() {
             return field;
         }
-        if self.covariance.variance(IRON) == 0.0 {
+        if self.state.covariance.variance(IRON) == 0.0 {
             let sigma = self.settings.hard_iron * field.norm();
             for axis in 0..3 {
-                self.covariance.restart(IRON + axis, sigma * sigma);
+                self.state.covariance.restart(IRON + axis, sigma * sigma);
             }
         }
-        field - self.calibration.hard_iron
+        field - self.state.calibration.hard_iron
     }
 
     /// Hard iron makes the norm of the field change with the attitude.
     fn use_norm(&mut self, correction: &mut Correction) {
-        let secs = self.interval.secs;
-        let field = self.interval.field_in_body / self.interval.fields;
+        let secs = self.state.interval.secs;
+        let field = self.state.interval.field_in_body / self.state.interval.fields;
         let norm = field.norm();
-        let mean = &mut self.surroundings.mean_norm;
+        let mean = &mut self.state.surroundings.mean_norm;
         if *mean == 0.0 {
             *mean = norm;
         }
@@ -75,7 +75,7 @@ impl Filter {
         let sigmas = off.abs() / white;
         let robust = (0.5 * sigmas).max(1.0).powi(2);
         let by_iron = |axis: usize| (IRON + axis, -field[axis] / norm);
-        self.covariance.measure(
+        self.state.covariance.measure(
             &[by_iron(0), by_iron(1), by_iron(2)],
             -off,
             white * white * 2.0 * self.settings.field_secs / secs * robust,
@@ -86,8 +86,8 @@ impl Filter {
     /// The measurement of heading, where there is one.
     pub(super) fn use_field(&mut self, correction: &mut Correction) {
         let settings = self.settings;
-        let secs = self.interval.secs;
-        let field: Vector3<f64> = self.interval.field / self.interval.fields;
+        let secs = self.state.interval.secs;
+        let field: Vector3<f64> = self.state.interval.field / self.state.interval.fields;
         let level = field.x.hypot(field.y);
         let now = Field {
             norm: level.hypot(field.z),
@@ -97,7 +97,7 @@ impl Filter {
             return;
         }
         let at_rest = self.rests();
-        let around = &mut self.surroundings;
+        let around = &mut self.state.surroundings;
         let reference = around.reference.get_or_insert(now);
         let (norm_off, dip_off) = reference.off(&now);
         let fits = reference.is_like(&now, &settings);
@@ -120,19 +120,19 @@ impl Filter {
         } else {
             around.other_secs = (around.other_secs - 2.0 * secs).max(0.0);
         }
-        let has_iron = self.covariance.has_iron();
+        let has_iron = self.state.covariance.has_iron();
         if has_iron {
             self.use_norm(correction);
         }
-        let around = &mut self.surroundings;
+        let around = &mut self.state.surroundings;
         let horizontal = level / now.norm;
         if horizontal < STEEPEST {
-            self.report.fields_rejected += 1;
+            self.state.report.fields_rejected += 1;
             return;
         }
         let deviation = (norm_off * norm_off + dip_off * dip_off) / (horizontal * horizontal);
         around.deviation += (deviation - around.deviation) * (secs / (DEVIATION_SECS + secs));
-        let covariance = &mut self.covariance;
+        let covariance = &mut self.state.covariance;
         let steep = field.z / level;
         let tilt = covariance.variance(TILT) + covariance.variance(TILT + 1);
         let white = settings.field_noise.powi(2);
@@ -141,13 +141,13 @@ impl Filter {
                 / secs
             + steep * steep * tilt / (2.0 * secs);
         // The field is seen turned to the east by as much as the heading is off.
-        let residual = wrapped(field.x.atan2(field.y) - self.disturbance);
+        let residual = wrapped(field.x.atan2(field.y) - self.state.disturbance);
         let expected = covariance.variance(HEADING)
             + covariance.variance(FIELD)
             + 2.0 * covariance.between(HEADING, FIELD);
         let sigmas = residual.abs() / (expected + white).sqrt();
         if sigmas > settings.field_robust {
-            self.report.fields_rejected += 1;
+            self.state.report.fields_rejected += 1;
             if fits {
                 around.contradicted += secs;
             }
@@ -161,7 +161,7 @@ impl Filter {
         } else {
             around.contradicted = (around.contradicted - 2.0 * secs).max(0.0);
         }
-        let seen = self.interval.by_iron / (self.interval.fields * level);
+        let seen = self.state.interval.by_iron / (self.state.interval.fields * level);
         let h = [
             (HEADING, 1.0),
             (FIELD, 1.0),
@@ -170,7 +170,7 @@ impl Filter {
             (IRON + 2, seen.z),
         ];
         let h = if has_iron { &h[..] } else { &h[..2] };
-        self.innovation.heading = covariance.measure(h, residual, variance, correction);
+        self.derived.innovation.heading = covariance.measure(h, residual, variance, correction);
     }
 }
 

@@ -1,11 +1,11 @@
 //! Samples since the last correction -> sums. Pure.
 
-use super::bounds::LARGEST;
 use super::calibration::Applied;
+use crate::plausible::{are_numbers, is_amount};
 use nalgebra::{Matrix3, Vector3};
 
 /// Sums between two corrections. Earth axes but for `rate`.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Interval {
     /// Length, s.
@@ -39,22 +39,6 @@ pub(super) struct Interval {
 }
 
 impl Interval {
-    pub(super) fn new() -> Interval {
-        Interval {
-            secs: 0.0,
-            force_secs: 0.0,
-            attitude: Matrix3::zeros(),
-            scaled: [[0.0; 6]; 3],
-            force: Vector3::zeros(),
-            lead: Vector3::zeros(),
-            rate: Vector3::zeros(),
-            field: Vector3::zeros(),
-            fields: 0.0,
-            field_in_body: Vector3::zeros(),
-            by_iron: Vector3::zeros(),
-        }
-    }
-
     /// Whether its sums can be: what a file says may be anything.
     pub(super) fn is_plausible(&self) -> bool {
         let times = [self.secs, self.force_secs, self.fields];
@@ -66,11 +50,10 @@ impl Interval {
             &self.field_in_body,
             &self.by_iron,
         ];
-        let mut scaled = self.scaled.iter().flatten();
-        times.iter().all(|time| (0.0..=LARGEST).contains(time))
-            && vectors.iter().all(|sum| sum.amax() <= LARGEST)
-            && self.attitude.amax() <= LARGEST
-            && scaled.all(|sum| sum.abs() <= LARGEST)
+        times.into_iter().all(is_amount)
+            && vectors.into_iter().all(are_numbers)
+            && are_numbers(&self.attitude)
+            && are_numbers(self.scaled.iter().flatten())
     }
 
     /// The attitude `r` at the end of `secs` in which the mean rate was measured as `rate`.

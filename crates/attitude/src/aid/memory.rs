@@ -2,22 +2,12 @@
 //!
 //! Apart from the filter because it is read by another process: nothing in it is believed unseen.
 
-use super::aided::{Aided, Given};
+use super::aided::{Aided, StreamState};
 use super::beside::Beside;
-use super::bounds::LARGEST;
-use super::calibration::{Applied, Calibration};
-use super::covariance::Covariance;
-use super::filter::{Filter, Report};
-use super::interval::Interval;
-use super::plausibility::Plausibility;
-use super::residuals::Residuals;
-use super::rest::Rest;
-use super::surroundings::Surroundings;
-use super::vertical::Vertical;
+use super::calibration::Applied;
+use super::state::State;
+use crate::plausible::{are_numbers, is_amount, is_unit};
 use crate::propagate;
-use crate::quaternion::Quaternion;
-use crate::record::Nanos;
-use nalgebra::Vector3;
 
 /// Most samples that wait for their attitude: no window looks further ahead.
 const MOST_GIVEN: usize = 64;
@@ -36,39 +26,10 @@ const LEAD: f64 = 1.0;
     serde(deny_unknown_fields)
 )]
 pub struct Memory {
-    is_started: bool,
-    calibration: Calibration,
-    covariance: Covariance,
-    /// Turn from the left of the propagator's attitude, w, x, y, z.
-    correction: [f64; 4],
-    velocity: [f64; 2],
-    position: [f64; 2],
-    disturbance: f64,
-    interval: Interval,
-    rest: Rest,
-    residuals: Residuals,
-    mean_acceleration: Vector3<f64>,
-    last_up: Option<Vector3<f64>>,
-    /// The vertical; as if nothing had been seen in a file that is older than this field.
-    #[cfg_attr(feature = "serde", serde(default))]
-    vertical: Vertical,
-    surroundings: Surroundings,
-    wants_level: bool,
-    nominal: f64,
-    gaps_in_a_row: u32,
-    last_rate: Vector3<f64>,
-    last_force: Option<Vector3<f64>>,
-    since_force: f64,
-    plausibility: Plausibility,
-    #[cfg_attr(feature = "serde", serde(default))]
-    is_widened: bool,
-    report: Report,
-    given: Vec<Given>,
-    last: Option<Nanos>,
-    /// The last attitude, w, x, y, z.
-    last_out: Option<[f64; 4]>,
-    forces: Option<Beside>,
-    fields: Beside,
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    filter: State,
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    stream: StreamState,
 }
 
 impl Aided {
@@ -76,36 +37,9 @@ impl Aided {
     #[must_use]
     pub fn memory(&self) -> Option<(propagate::Memory, Memory)> {
         let propagation = self.propagator.memory()?;
-        let filter = &self.filter;
         let memory = Memory {
-            is_started: filter.is_started,
-            calibration: filter.calibration,
-            covariance: filter.covariance.clone(),
-            correction: filter.correction.wxyz(),
-            velocity: filter.velocity,
-            position: filter.position,
-            disturbance: filter.disturbance,
-            interval: filter.interval.clone(),
-            rest: filter.rest.clone(),
-            residuals: filter.residuals.clone(),
-            mean_acceleration: filter.mean_acceleration,
-            last_up: filter.last_up,
-            vertical: filter.vertical,
-            surroundings: filter.surroundings.clone(),
-            wants_level: filter.wants_level,
-            nominal: filter.nominal,
-            gaps_in_a_row: filter.gaps_in_a_row,
-            last_rate: filter.last_rate,
-            last_force: filter.last_force,
-            since_force: filter.since_force,
-            plausibility: filter.plausibility,
-            is_widened: filter.is_widened,
-            report: filter.report,
-            given: self.given.iter().copied().collect(),
-            last: self.last,
-            last_out: self.last_out.map(|q| q.wxyz()),
-            forces: self.forces.clone(),
-            fields: self.fields.clone(),
+            filter: self.filter.state.clone(),
+            stream: self.stream.clone(),
         };
         Some((propagation, memory))
     }
@@ -114,45 +48,15 @@ impl Aided {
     /// known it.
     #[must_use]
     pub fn recall(&mut self, (propagation, memory): (&propagate::Memory, &Memory)) -> bool {
-        let has_forces = self.forces.is_some() == memory.forces.is_some()
-            && self.filter.covariance.has_iron() == memory.covariance.has_iron();
+        let has_forces = self.stream.forces.is_some() == memory.has_forces_beside()
+            && self.filter.state.covariance.has_iron() == memory.filter.covariance.has_iron();
         if !memory.is_plausible() || !has_forces || !self.propagator.recall(propagation) {
             return false;
         }
-        let memory = memory.clone();
-        self.filter = Filter {
-            is_started: memory.is_started,
-            known: Applied::of(&memory.calibration),
-            calibration: memory.calibration,
-            covariance: memory.covariance,
-            correction: Quaternion::assume_unit(memory.correction),
-            velocity: memory.velocity,
-            position: memory.position,
-            disturbance: memory.disturbance,
-            interval: memory.interval,
-            rest: memory.rest,
-            residuals: memory.residuals,
-            mean_acceleration: memory.mean_acceleration,
-            last_up: memory.last_up,
-            vertical: memory.vertical,
-            surroundings: memory.surroundings,
-            wants_level: memory.wants_level,
-            nominal: memory.nominal,
-            gaps_in_a_row: memory.gaps_in_a_row,
-            last_rate: memory.last_rate,
-            last_force: memory.last_force,
-            since_force: memory.since_force,
-            plausibility: memory.plausibility,
-            is_widened: memory.is_widened,
-            report: memory.report,
-            ..self.filter.clone()
-        };
+        self.filter.state = memory.filter.clone();
+        self.filter.derived.known = Applied::of(&memory.filter.calibration);
+        self.stream = memory.stream.clone();
         self.is_resumed = false;
-        self.given = memory.given.into();
-        self.last = memory.last;
-        self.last_out = memory.last_out.map(Quaternion::assume_unit);
-        self.forces = memory.forces;
-        self.fields = memory.fields;
         true
     }
 }
@@ -161,49 +65,42 @@ impl Memory {
     /// Whether specific forces came in messages of their own.
     #[must_use]
     pub fn has_forces_beside(&self) -> bool {
-        self.forces.is_some()
+        self.stream.forces.is_some()
     }
 
     /// Whether a filter can have known it, whatever its settings.
     pub(crate) fn is_plausible(&self) -> bool {
-        let calibration = &self.calibration;
-        let is_unit = |q: &[f64; 4]| (q.iter().map(|c| c * c).sum::<f64>() - 1.0).abs() < 1e-9;
-        let beside = self.forces.iter().chain([&self.fields]);
-        let scalars = [
-            self.disturbance,
-            self.nominal,
-            self.since_force,
-            self.interval.secs,
-        ];
-        let vectors = [
-            self.mean_acceleration,
-            self.last_rate,
-            self.last_force.unwrap_or_default(),
-            self.last_up.unwrap_or_default(),
-        ];
-        let mut numbers = scalars
-            .into_iter()
-            .chain(vectors.iter().flat_map(|v| v.iter().copied()))
-            .chain(self.velocity)
-            .chain(self.position);
+        let Memory { filter, stream } = self;
+        let calibration = &filter.calibration;
+        let scalars = [filter.disturbance, filter.since_force];
+        let vectors = [&filter.mean_acceleration, &filter.last_rate];
+        let unseen = [&filter.last_force, &filter.last_up];
+        let mut beside = stream.forces.iter().chain([&stream.fields]);
         calibration.bias.amax() <= BIAS
             && calibration.scale.amax().max(calibration.cross.amax()) <= SCALE
             && calibration.force_bias.amax() <= FORCE_BIAS
             && calibration.lead.abs() <= LEAD
-            && calibration.hard_iron.iter().all(|h| h.abs() <= LARGEST)
-            && self.covariance.is_plausible()
-            && is_unit(&self.correction)
-            && self.last_out.iter().all(is_unit)
-            && numbers.all(|number| number.abs() <= LARGEST)
-            && self.nominal >= 0.0
-            && self.interval.is_plausible()
-            && self.residuals.is_plausible()
-            && self.surroundings.is_plausible()
-            && self.plausibility.is_plausible()
-            && self.given.len() <= MOST_GIVEN
-            && self.rest.is_bounded()
-            && self.vertical.is_plausible()
-            && beside.into_iter().all(Beside::is_bounded)
+            && are_numbers(&calibration.hard_iron)
+            && filter.covariance.is_plausible()
+            && is_unit(&filter.correction.wxyz())
+            && stream.last_out.iter().all(is_unit)
+            && are_numbers(
+                scalars
+                    .iter()
+                    .chain(&filter.velocity)
+                    .chain(&filter.position),
+            )
+            && vectors.into_iter().all(are_numbers)
+            && unseen.into_iter().flatten().all(are_numbers)
+            && is_amount(filter.nominal)
+            && filter.interval.is_plausible()
+            && filter.residuals.is_plausible()
+            && filter.surroundings.is_plausible()
+            && filter.plausibility.is_plausible()
+            && stream.given.len() <= MOST_GIVEN
+            && filter.rest.is_bounded()
+            && filter.vertical.is_plausible()
+            && beside.all(Beside::is_bounded)
     }
 }
 
@@ -211,11 +108,14 @@ impl Memory {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::aid::covariance::Covariance;
+    use crate::aid::vertical::Vertical;
     use crate::aid::{Settings, Start};
     use crate::frames::In;
     use crate::propagate::{Method, Order};
-    use crate::quaternion::BodyRate;
-    use crate::record::{AttitudeSample, Join, Measured, RateSample, Status};
+    use crate::quaternion::{BodyRate, Quaternion};
+    use crate::record::{AttitudeSample, Join, Measured, Nanos, RateSample, Status};
+    use nalgebra::Vector3;
 
     fn sample(i: i64) -> RateSample {
         let t = i as f64 * 0.01;
@@ -304,14 +204,19 @@ mod tests {
     fn plain(memory: &Memory) -> Memory {
         let text = serde_json::to_string(memory).unwrap();
         // Each sample that waits has what it was corrected by.
-        let iron = if memory.covariance.has_iron() {
+        let iron = if memory.filter.covariance.has_iron() {
             1800
         } else {
             0
         };
         // The last four hundred are those of the vertical, fourteen numbers.
-        let most = 8192 + 400 + iron + 700 * memory.given.len().saturating_sub(1);
-        assert!(text.len() < most, "{} {}", text.len(), memory.given.len());
+        let most = 8192 + 400 + iron + 700 * memory.stream.given.len().saturating_sub(1);
+        assert!(
+            text.len() < most,
+            "{} {}",
+            text.len(),
+            memory.stream.given.len()
+        );
         serde_json::from_str(&text).unwrap()
     }
 
@@ -331,10 +236,31 @@ mod tests {
         let rest = text["rest"].as_object_mut().unwrap();
         assert!(rest.remove("is_certain").is_some());
         let older: Memory = serde_json::from_value(text).unwrap();
-        assert_eq!(older.vertical, Vertical::default());
+        assert_eq!(older.filter.vertical, Vertical::default());
         let mut other = aided(Method::Auto);
         assert!(other.recall((&propagation, &older)));
         assert_eq!(fed(&mut other, 500..600).len(), 100);
+    }
+
+    /// A key that is renamed is one that an older file does not have; a new one is added here, and is read with
+    /// `serde(default)`.
+    #[cfg(feature = "serde")]
+    #[test]
+    fn the_keys_of_a_state_file_stay_and_others_are_refused() {
+        let mut whole = aided(Method::Auto);
+        let _ = fed(&mut whole, 0..50);
+        let (_, memory) = whole.memory().unwrap();
+        let mut text = serde_json::to_value(&memory).unwrap();
+        let keys: Vec<&String> = text.as_object().unwrap().keys().collect();
+        let all = "calibration correction covariance disturbance fields forces gaps_in_a_row given interval is_started \
+                   is_widened last last_force last_out last_rate last_up mean_acceleration nominal plausibility \
+                   position report residuals rest since_force surroundings velocity vertical wants_level";
+        assert_eq!(keys, all.split_whitespace().collect::<Vec<_>>());
+        text["of_a_later_release"] = 1.into();
+        let why = serde_json::from_value::<Memory>(text)
+            .unwrap_err()
+            .to_string();
+        assert!(why.contains("unknown field `of_a_later_release`"), "{why}");
     }
 
     #[test]
@@ -343,16 +269,16 @@ mod tests {
         let _ = fed(&mut whole, 0..500);
         let (propagation, good) = whole.memory().unwrap();
         let spoil: [fn(&mut Memory); 9] = [
-            |m| m.correction[0] = 2.0,
-            |m| m.calibration.bias.x = 1e3,
-            |m| m.covariance = Covariance::try_from(vec![-1.0; 231]).unwrap(),
+            |m| m.filter.correction = Quaternion::assume_unit([2.0, 0.0, 0.0, 0.0]),
+            |m| m.filter.calibration.bias.x = 1e3,
+            |m| m.filter.covariance = Covariance::try_from(vec![-1.0; 231]).unwrap(),
             // With hard iron, where none is looked for.
-            |m| m.covariance = Covariance::try_from(vec![1e-9; 300]).unwrap(),
-            |m| m.calibration.hard_iron.y = f64::NAN,
-            |m| m.velocity[1] = f64::NAN,
-            |m| m.nominal = -1.0,
-            |m| m.vertical.take(&Vector3::z(), -50.0, 0.05),
-            |m| m.forces = Some(Beside::default()),
+            |m| m.filter.covariance = Covariance::try_from(vec![1e-9; 300]).unwrap(),
+            |m| m.filter.calibration.hard_iron.y = f64::NAN,
+            |m| m.filter.velocity[1] = f64::NAN,
+            |m| m.filter.nominal = -1.0,
+            |m| m.filter.vertical.take(&Vector3::z(), -50.0, 0.05),
+            |m| m.stream.forces = Some(Beside::default()),
         ];
         for (n, spoil) in spoil.into_iter().enumerate() {
             let mut bad = good.clone();

@@ -7,7 +7,7 @@
 //! `T`: a body that walks, runs or is shaken passes after a second or a few, and no length of a single sample
 //! has to be gravity's.
 
-use super::bounds::LARGEST;
+use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 
 /// First and last time at which it is judged, s.
@@ -42,9 +42,7 @@ impl Plausibility {
     /// Whether it can have been seen: what a file says may be anything.
     pub(super) fn is_plausible(&self) -> bool {
         match self {
-            Plausibility::Seen(sum, secs) => {
-                sum.amax() <= LARGEST && (0.0..=LARGEST).contains(secs)
-            }
+            Plausibility::Seen(sum, secs) => are_numbers(sum) && is_amount(*secs),
             Plausibility::Open | Plausibility::Given | Plausibility::Denied => true,
         }
     }

@@ -1,10 +1,10 @@
 //! Residuals of the specific force, one after another -> the variance of the next. Pure.
 
-use super::bounds::LARGEST;
 use super::settings::Settings;
+use crate::plausible::{are_numbers, is_amount};
 
 /// Statistics of residuals.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Residuals {
     /// Power density, m^2/s^3.
@@ -19,19 +19,14 @@ impl Residuals {
     pub(super) fn new(settings: &Settings) -> Residuals {
         Residuals {
             density: settings.force_start,
-            square: 0.0,
-            product: 0.0,
-            last: [0.0; 2],
+            ..Residuals::default()
         }
     }
 
     /// Whether they can be: what a file says may be anything.
     pub(super) fn is_plausible(&self) -> bool {
-        let is_mean = |square: f64| (0.0..=LARGEST).contains(&square);
-        is_mean(self.density)
-            && is_mean(self.square)
-            && self.product.abs() <= LARGEST
-            && self.last.iter().all(|residual| residual.abs() <= LARGEST)
+        [self.density, self.square].into_iter().all(is_amount)
+            && are_numbers(self.last.iter().chain([&self.product]))
     }
 
     /// The reference was left: what comes has nothing to do with what was.

@@ -1,7 +1,7 @@
 //! Rate and force -> whether the sensor is at rest, and what its gyro reads there. Pure.
 
-use super::bounds::LARGEST;
 use super::settings::Settings;
+use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ const MEAN_SECS: f64 = 0.5;
 const DRIFT: f64 = 0.002;
 
 /// Whether rate and force have been quiet for long enough.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Rest {
     rate: Vector3<f64>,
@@ -41,11 +41,8 @@ pub(super) struct RestRate {
 impl Rest {
     pub(super) fn new(force: Vector3<f64>) -> Rest {
         Rest {
-            rate: Vector3::zeros(),
             force,
-            quiet: 0.0,
-            open: VecDeque::new(),
-            is_certain: false,
+            ..Rest::default()
         }
     }
 
@@ -173,16 +170,14 @@ impl Rest {
 
     /// Whether it can have come about.
     pub(super) fn is_bounded(&self) -> bool {
-        let is_small = |v: &Vector3<f64>| v.amax() <= LARGEST;
-        let is_time = |secs: f64| (0.0..=LARGEST).contains(&secs);
         self.open.len() <= MOST
-            && is_small(&self.rate)
-            && is_small(&self.force)
-            && is_time(self.quiet)
+            && are_numbers(&self.rate)
+            && are_numbers(&self.force)
+            && is_amount(self.quiet)
             && self
                 .open
                 .iter()
-                .all(|(rate, secs)| is_small(rate) && is_time(*secs))
+                .all(|(rate, secs)| are_numbers(rate) && is_amount(*secs))
     }
 
     pub(super) fn is_quiet(&self, settings: &Settings) -> bool {

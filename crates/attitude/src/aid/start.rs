@@ -27,10 +27,10 @@ impl Filter {
     /// Begins at a first sample: level by its specific force and with the heading of the propagator's attitude,
     /// or north by its field. Without a force the attitude is the propagator's for now.
     pub(crate) fn begin(&mut self, first: &Measured, propagated: &Quaternion<Nav, Body>) {
-        self.last_rate = first.rate;
-        self.last_force = None;
-        self.since_force = 0.0;
-        self.interval = Interval::new();
+        self.state.last_rate = first.rate;
+        self.state.last_force = None;
+        self.state.since_force = 0.0;
+        self.state.interval = Interval::default();
         let is_denied = self.is_force_implausible();
         let force = first.force.filter(|f| self.is_force(f) && f.norm() > 0.0);
         let Some(force) = force.filter(|_| !is_denied) else {
@@ -64,16 +64,16 @@ impl Filter {
 
     /// Begins with the attitude as the propagator has it, known to `tilt` and `heading` (rad).
     pub(crate) fn begin_known(&mut self, first: &Measured, tilt: f64, heading: f64) {
-        self.last_rate = first.rate;
-        self.last_force = None;
-        self.since_force = 0.0;
+        self.state.last_rate = first.rate;
+        self.state.last_force = None;
+        self.state.since_force = 0.0;
         let force = first
             .force
             .filter(|f| self.is_force(f))
             .unwrap_or(Vector3::z() * self.settings.gravity);
         self.start(Quaternion::identity(), heading * heading, force);
         for axis in [TILT, TILT + 1] {
-            self.covariance.restart(axis, tilt * tilt);
+            self.state.covariance.restart(axis, tilt * tilt);
         }
     }
 
@@ -81,62 +81,71 @@ impl Filter {
     /// of its changes.
     pub(super) fn give_gravity_up(&mut self) {
         for axis in [TILT, TILT + 1] {
-            self.covariance.restart(axis, TILT_UNKNOWN * TILT_UNKNOWN);
+            self.state
+                .covariance
+                .restart(axis, TILT_UNKNOWN * TILT_UNKNOWN);
         }
-        self.last_force = None;
-        self.rest.interrupt();
+        self.state.last_force = None;
+        self.state.rest.interrupt();
     }
 
     /// Resets, and keeps the calibration, known a little less.
     pub(crate) fn reset(&mut self) {
         self.begin_anew();
         for axis in 0..3 {
-            self.covariance
+            self.state
+                .covariance
                 .add(BIAS + axis, BIAS_AFTER_RESET * BIAS_AFTER_RESET);
         }
     }
 
     /// The attitude is not known any more, the calibration as well as before.
     pub(crate) fn begin_anew(&mut self) {
-        self.is_started = false;
-        self.has_levelled = false;
-        self.correction = Quaternion::identity();
+        self.state.is_started = false;
+        self.derived.has_levelled = false;
+        self.state.correction = Quaternion::identity();
     }
 
     fn start(&mut self, correction: Quaternion<Nav, Nav>, heading: f64, force: Vector3<f64>) {
         let settings = &self.settings;
-        self.correction = correction.normalised();
-        self.covariance
+        self.state.correction = correction.normalised();
+        self.state
+            .covariance
             .restart(TILT, settings.tilt_start * settings.tilt_start);
-        self.covariance
+        self.state
+            .covariance
             .restart(TILT + 1, settings.tilt_start * settings.tilt_start);
-        self.covariance.restart(HEADING, heading);
+        self.state.covariance.restart(HEADING, heading);
         for i in 0..2 {
-            self.covariance.restart(VELOCITY + i, VELOCITY_START);
-            self.covariance.restart(POSITION + i, POSITION_START);
+            self.state.covariance.restart(VELOCITY + i, VELOCITY_START);
+            self.state.covariance.restart(POSITION + i, POSITION_START);
         }
         let disturbed = if heading > 0.0 {
             settings.field_sigma * settings.field_sigma
         } else {
             0.0
         };
-        self.covariance.restart(FIELD, disturbed);
-        (self.velocity, self.position, self.disturbance) = ([0.0; 2], [0.0; 2], 0.0);
-        self.interval = Interval::new();
-        self.rest = Rest::new(force);
-        self.residuals = Residuals::new(settings);
-        self.mean_acceleration = Vector3::zeros();
-        self.surroundings = Surroundings::default();
-        self.wants_level = false;
-        self.is_started = true;
+        self.state.covariance.restart(FIELD, disturbed);
+        (
+            self.state.velocity,
+            self.state.position,
+            self.state.disturbance,
+        ) = ([0.0; 2], [0.0; 2], 0.0);
+        self.state.interval = Interval::default();
+        self.state.rest = Rest::new(force);
+        self.state.residuals = Residuals::new(settings);
+        self.state.mean_acceleration = Vector3::zeros();
+        self.state.surroundings = Surroundings::default();
+        self.state.wants_level = false;
+        self.state.is_started = true;
     }
 
     /// The sensor as it was switched on.
     pub(super) fn forget_calibration(&mut self) {
         let settings = self.settings;
-        (self.calibration, self.covariance) = settings.prior.begin(&settings);
-        self.known = Applied::of(&self.calibration);
-        self.is_widened = false;
-        self.vertical = Vertical::default();
+        (self.state.calibration, self.state.covariance) = settings.prior.begin(&settings);
+        self.derived.known = Applied::of(&self.state.calibration);
+        self.state.is_widened = false;
+        self.state.vertical = Vertical::default();
     }
 }

@@ -1,7 +1,7 @@
 //! The magnetic fields that were met, and which of them headings are believed in. Pure.
 
-use super::bounds::LARGEST;
 use super::settings::Settings;
+use crate::plausible::is_amount;
 
 /// Norm and dip of a field.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -49,7 +49,6 @@ pub(super) struct Surroundings {
 impl Surroundings {
     /// Whether a field can have been so: what a file says may be anything.
     pub(super) fn is_plausible(&self) -> bool {
-        let is_amount = |number: &f64| (0.0..=LARGEST).contains(number);
         let mut fields = self.reference.iter().chain(&self.other);
         let amounts = [
             self.other_secs,
@@ -57,9 +56,9 @@ impl Surroundings {
             self.contradicted,
             self.mean_norm,
         ];
-        amounts.iter().all(is_amount)
+        amounts.into_iter().all(is_amount)
             && fields
-                .all(|field| field.norm > 0.0 && is_amount(&field.norm) && field.dip.abs() <= 4.0)
+                .all(|field| field.norm > 0.0 && is_amount(field.norm) && field.dip.abs() <= 4.0)
     }
 
     /// Mean norm of the field, where hard iron is looked for.

@@ -18,29 +18,30 @@ impl Filter {
     /// Corrects by what has been added up.
     pub(super) fn update(&mut self) {
         let settings = self.settings;
-        if self.report.updates == 0 && settings.prior.lead_sigma.is_none() {
-            self.covariance
-                .add(LEAD, (settings.lead_share * self.nominal).powi(2));
+        if self.state.report.updates == 0 && settings.prior.lead_sigma.is_none() {
+            self.state
+                .covariance
+                .add(LEAD, (settings.lead_share * self.state.nominal).powi(2));
         }
-        self.report.updates += 1;
-        self.innovation = Innovation::NONE;
+        self.state.report.updates += 1;
+        self.derived.innovation = Innovation::NONE;
         let force = self.mean_force();
         let is_levelled = force.is_some_and(|force| self.judge_tilt(&force));
         self.predict(force.as_ref());
         let mut correction: Correction = [0.0; WIDTH];
-        if let Some(force) = force.filter(|_| !is_levelled && !self.wants_level) {
+        if let Some(force) = force.filter(|_| !is_levelled && !self.state.wants_level) {
             self.use_gravity(&force, &mut correction);
         }
         self.use_rest(&mut correction);
-        if self.interval.fields > 0.0 {
+        if self.state.interval.fields > 0.0 {
             self.use_field(&mut correction);
         }
         self.inject(&correction);
         self.widen();
-        self.interval = Interval::new();
-        let attitude = self.correction.wxyz();
-        if !self.covariance.is_sound() || !attitude.iter().all(|c| c.is_finite()) {
-            self.report.failures += 1;
+        self.state.interval = Interval::default();
+        let attitude = self.state.correction.wxyz();
+        if !self.state.covariance.is_sound() || !attitude.iter().all(|c| c.is_finite()) {
+            self.state.report.failures += 1;
             self.forget_calibration();
             self.reset();
         }
@@ -48,18 +49,18 @@ impl Filter {
 
     /// The measurement of the gyro's bias, where the body rests.
     fn use_rest(&mut self, correction: &mut Correction) {
-        let secs = self.interval.secs;
+        let secs = self.state.interval.secs;
         // What the gyro reads of a world that turns is no bias.
-        let of_world = self.interval.attitude.transpose() * self.world_rate;
-        let mean = (self.interval.rate - of_world) / secs;
+        let of_world = self.state.interval.attitude.transpose() * self.world_rate;
+        let mean = (self.state.interval.rate - of_world) / secs;
         let is_at_rest = self.rests();
-        let rest = &mut self.rest;
+        let rest = &mut self.state.rest;
         let Some(rate) = rest.take_interval(mean, secs, is_at_rest, &self.settings) else {
             return;
         };
         for axis in 0..3 {
-            let innovation = rate.mean[axis] - self.calibration.bias[axis];
-            self.covariance.measure(
+            let innovation = rate.mean[axis] - self.state.calibration.bias[axis];
+            self.state.covariance.measure(
                 &[(BIAS + axis, 1.0)],
                 innovation,
                 rate.variance[axis],
@@ -69,7 +70,7 @@ impl Filter {
     }
 
     fn mean_force(&self) -> Option<Force> {
-        let sums = &self.interval;
+        let sums = &self.state.interval;
         if sums.force_secs <= 0.5 * sums.secs {
             return None;
         }
@@ -89,16 +90,16 @@ impl Filter {
     /// Takes the covariance over the interval.
     fn predict(&mut self, force: Option<&Force>) {
         let settings = self.settings;
-        let secs = self.interval.secs;
+        let secs = self.state.interval.secs;
         let half_square = 0.5 * secs * secs;
         let mut transition = Transition::none();
         let rows = &mut transition.0;
-        let by_bias = self.interval.attitude * self.known.matrix;
+        let by_bias = self.state.interval.attitude * self.derived.known.matrix;
         for axis in 0..3 {
             for j in 0..3 {
                 rows[axis][BIAS + j] = -by_bias[(axis, j)];
-                rows[axis][SCALE + j] = self.interval.scaled[axis][j];
-                rows[axis][CROSS + j] = self.interval.scaled[axis][3 + j];
+                rows[axis][SCALE + j] = self.state.interval.scaled[axis][j];
+                rows[axis][CROSS + j] = self.state.interval.scaled[axis][3 + j];
             }
         }
         for i in 0..2 {
@@ -116,30 +117,37 @@ impl Filter {
             rows[POSITION][TILT + 1] = half_square * force.up;
             rows[POSITION + 1][TILT] = -half_square * force.up;
         }
-        self.covariance.step(&transition);
-        let turned = settings.rate_noise.powi(2) * self.interval.turned_squared() / 9.0;
-        self.covariance
+        self.state.covariance.step(&transition);
+        let turned = settings.rate_noise.powi(2) * self.state.interval.turned_squared() / 9.0;
+        self.state
+            .covariance
             .add_to_attitude(settings.gyro_noise.powi(2) * secs + turned);
-        let up = self.interval.attitude.row(2).transpose() / secs;
-        let tilted = self.last_up.map_or(0.0, |last| (up - last).norm_squared());
-        self.last_up = Some(up);
-        self.vertical.take(&up, secs, settings.lean_believed);
+        let up = self.state.interval.attitude.row(2).transpose() / secs;
+        let tilted = self
+            .state
+            .last_up
+            .map_or(0.0, |last| (up - last).norm_squared());
+        self.state.last_up = Some(up);
+        self.state.vertical.take(&up, secs, settings.lean_believed);
         let bias = settings.bias_walk.powi(2) * secs + settings.bias_by_tilt.powi(2) * tilted;
         for axis in 0..3 {
-            self.covariance.add(BIAS + axis, bias);
-            self.covariance
+            self.state.covariance.add(BIAS + axis, bias);
+            self.state
+                .covariance
                 .add(FORCE_BIAS + axis, settings.force_bias_walk.powi(2) * secs);
         }
         for i in 0..2 {
-            self.covariance
+            self.state
+                .covariance
                 .add(VELOCITY + i, settings.velocity_walk.powi(2) * secs);
         }
-        if self.covariance.variance(FIELD) > 0.0 {
+        if self.state.covariance.variance(FIELD) > 0.0 {
             let left = (-secs / settings.field_secs).exp();
-            self.covariance.fade(FIELD, left);
-            self.covariance
+            self.state.covariance.fade(FIELD, left);
+            self.state
+                .covariance
                 .add(FIELD, settings.field_sigma.powi(2) * (1.0 - left * left));
-            self.disturbance *= left;
+            self.state.disturbance *= left;
         }
     }
 
@@ -149,27 +157,27 @@ impl Filter {
         let heading = Vector3::z() * correction[HEADING];
         let turn =
             |phi: Vector3<f64>| Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(phi));
-        self.correction = (turn(heading) * (turn(tilt) * self.correction)).normalised();
+        self.state.correction = (turn(heading) * (turn(tilt) * self.state.correction)).normalised();
         let three = |first: usize| {
             Vector3::from_fn(|i, _| correction.get(first + i).copied().unwrap_or(0.0))
         };
         for i in 0..2 {
-            self.velocity[i] += correction[VELOCITY + i];
-            self.position[i] += correction[POSITION + i];
+            self.state.velocity[i] += correction[VELOCITY + i];
+            self.state.position[i] += correction[POSITION + i];
         }
-        let calibration = &mut self.calibration;
+        let calibration = &mut self.state.calibration;
         calibration.bias += three(BIAS);
         calibration.scale += three(SCALE);
         calibration.cross += three(CROSS);
         calibration.force_bias += three(FORCE_BIAS);
         calibration.lead += correction[LEAD];
         calibration.hard_iron += three(IRON);
-        self.disturbance += correction[FIELD];
-        self.known = Applied::of(calibration);
+        self.state.disturbance += correction[FIELD];
+        self.derived.known = Applied::of(calibration);
         // The earth axes of the estimate have turned.
         let (sin, cos) = correction[HEADING].sin_cos();
-        self.covariance.turn(cos, sin);
-        for pair in [&mut self.velocity, &mut self.position] {
+        self.state.covariance.turn(cos, sin);
+        for pair in [&mut self.state.velocity, &mut self.state.position] {
             let [x, y] = *pair;
             *pair = [cos * x - sin * y, sin * x + cos * y];
         }
@@ -191,15 +199,15 @@ impl Filter {
             Vector3::zeros()
         };
         let turn = Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(phi));
-        self.correction = (turn * self.correction).normalised();
+        self.state.correction = (turn * self.state.correction).normalised();
         for axis in [TILT, TILT + 1] {
             let variance = self.settings.tilt_start.powi(2);
-            self.covariance.restart(axis, variance);
+            self.state.covariance.restart(axis, variance);
         }
         self.restart_reference(VELOCITY_START, POSITION_START);
-        self.mean_acceleration = Vector3::zeros();
-        self.report.levelled += 1;
-        self.has_levelled = true;
+        self.state.mean_acceleration = Vector3::zeros();
+        self.state.report.levelled += 1;
+        self.derived.has_levelled = true;
         true
     }
 
@@ -211,12 +219,12 @@ impl Filter {
         r: &Matrix3<f64>,
         rate: &Vector3<f64>,
     ) -> AttitudeCovariance {
-        if !self.is_started {
+        if !self.state.is_started {
             return AttitudeCovariance::from_sigma(Vector3::repeat(std::f64::consts::PI));
         }
         let settings = &self.settings;
-        let white = settings.gyro_noise.powi(2) * self.interval.secs;
-        let mut earth = self.covariance.attitude();
+        let white = settings.gyro_noise.powi(2) * self.state.interval.secs;
+        let mut earth = self.state.covariance.attitude();
         for axis in 0..3 {
             earth[(axis, axis)] += white;
         }
@@ -233,6 +241,6 @@ impl Filter {
     /// [`Filter::attitude_covariance`] says.
     #[cfg(test)]
     pub(super) fn earth_variances(&self) -> [f64; 3] {
-        [TILT, TILT + 1, HEADING].map(|state| self.covariance.variance(state))
+        [TILT, TILT + 1, HEADING].map(|state| self.state.covariance.variance(state))
     }
 }

@@ -45,8 +45,8 @@ fn hard_iron_is_found_while_the_body_turns_every_way() {
         // A tenth of the field before.
         assert!(sigma[axis] < 2.2, "{sigma}");
     }
-    assert!(run.filter.covariance.smallest_pivot() > 1e-6);
-    assert!(run.filter.covariance.asymmetry() < 1e-12);
+    assert!(run.filter.state.covariance.smallest_pivot() > 1e-6);
+    assert!(run.filter.state.covariance.asymmetry() < 1e-12);
 }
 
 #[test]

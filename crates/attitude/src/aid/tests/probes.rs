@@ -32,8 +32,8 @@ fn the_covariance_stays_one() {
     let (mut pivot, mut asymmetry) = (f64::INFINITY, 0.0_f64);
     for with_field in [false, true] {
         run(Settings::default(), with_field, |_, run| {
-            pivot = pivot.min(run.filter.covariance.smallest_pivot());
-            asymmetry = asymmetry.max(run.filter.covariance.asymmetry());
+            pivot = pivot.min(run.filter.state.covariance.smallest_pivot());
+            asymmetry = asymmetry.max(run.filter.state.covariance.asymmetry());
         });
     }
     // Found 6e-4 and 2e-14.
@@ -44,14 +44,14 @@ fn the_covariance_stays_one() {
 #[test]
 fn a_covariance_with_an_impossible_number_is_noticed() {
     let mut run = run(Settings::default(), false, |_, _| ());
-    run.filter.covariance.add(7, f64::NAN);
+    run.filter.state.covariance.add(7, f64::NAN);
     for k in 2001..2020 {
         let (rate, force, _) = sample(k);
         run.take(k as f64 * 0.01, rate, Some(force), None);
     }
     assert!(run.filter.report().failures > 0);
     assert!(run.attitude().wxyz().iter().all(|c| c.is_finite()));
-    assert!(run.filter.covariance.smallest_pivot() > 0.0);
+    assert!(run.filter.state.covariance.smallest_pivot() > 0.0);
 }
 
 /// Angle at the end between the golden run and one in which sample 777 was changed, degrees.
