@@ -86,12 +86,22 @@ pub struct Conditioner {
     finishing: bool,
     /// `--start`, `--until` in nanoseconds after the first stamp.
     trim: Option<(i64, i64)>,
-    first_stamp: Option<Nanos>,
     /// A first sample with stamp zero, until the second tells whether that can be.
     zero: Option<(RawSample, u64)>,
-    rejected: bool,
-    index: u64,
+    state: State,
     report: Report,
+}
+
+/// State of a [`Conditioner`] beside those of its stages. A new field is added here alone, with `serde(default)`.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct State {
+    /// Number of samples so far.
+    index: u64,
+    /// Stamp that `start` and `until` are counted from.
+    trimmed_from: Option<Nanos>,
+    /// Whether the sample before was dropped.
+    rejected: bool,
 }
 
 impl Conditioner {
@@ -127,10 +137,8 @@ impl Conditioner {
                     settings.until.map_or(i64::MAX, secs_to_nanos),
                 )
             }),
-            first_stamp: None,
             zero: None,
-            rejected: false,
-            index: 0,
+            state: State::default(),
             report: Report::default(),
         })
     }
@@ -151,10 +159,11 @@ impl Conditioner {
     /// [`Clock::Index`] gives them their time.
     pub fn push_undecodable(&mut self, n: u64) {
         if n > 0 {
-            self.report.note(Verdict::Undecodable, self.index, None);
+            self.report
+                .note(Verdict::Undecodable, self.state.index, None);
             self.report.counts.add_many(Verdict::Undecodable, n - 1);
-            self.index = self.index.saturating_add(n);
-            self.rejected = true;
+            self.state.index = self.state.index.saturating_add(n);
+            self.state.rejected = true;
         }
     }
 
@@ -179,8 +188,8 @@ impl Conditioner {
 
     #[inline]
     fn take(&mut self, raw: &RawSample, out: &mut Vec<RateSample>) {
-        let index = self.index;
-        self.index += 1;
+        let index = self.state.index;
+        self.state.index += 1;
         let stamp = match &mut self.index_clock {
             None => self.clock.read(raw),
             Some(clock) => Some(clock.stamp(index, raw.log)),
@@ -203,7 +212,7 @@ impl Conditioner {
     #[inline]
     fn pass(&mut self, raw: &RawSample, stamp: Nanos, index: u64, out: &mut Vec<RateSample>) {
         if let Some((start, until)) = self.trim {
-            let first = *self.first_stamp.get_or_insert(stamp);
+            let first = *self.state.trimmed_from.get_or_insert(stamp);
             if !(start..=until).contains(&stamp.since(first)) {
                 return self.report.note(Verdict::Trimmed, index, Some(stamp));
             }
@@ -211,8 +220,8 @@ impl Conditioner {
         let spacing = self.timing.spacing();
         match self.gate.pass(raw, stamp, index, spacing) {
             Ok(mut entry) => {
-                if self.rejected {
-                    self.rejected = false;
+                if self.state.rejected {
+                    self.state.rejected = false;
                     entry.status = entry.status.with(Status::REJECTED_BEFORE);
                 }
                 if raw.accel.is_some() && gate::finite_accel(&entry.accel).is_none() {
@@ -256,7 +265,7 @@ impl Conditioner {
     #[cold]
     fn reject(&mut self, verdict: Verdict, index: u64, stamp: Option<Nanos>) {
         self.report.note(verdict, index, stamp);
-        self.rejected = true;
+        self.state.rejected = true;
     }
 
     /// Times every entry that need not wait any longer.

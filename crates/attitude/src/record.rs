@@ -241,6 +241,7 @@ impl RateSample {
 
 /// Bits that travel with a sample to the output's `status`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Status(pub u16);
 
 impl Status {

@@ -249,18 +249,31 @@ mod tests {
     fn the_keys_of_a_state_file_stay_and_others_are_refused() {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..50);
-        let (_, memory) = whole.memory().unwrap();
-        let mut text = serde_json::to_value(&memory).unwrap();
-        let keys: Vec<&String> = text.as_object().unwrap().keys().collect();
-        let all = "calibration correction covariance disturbance fields forces gaps_in_a_row given interval is_started \
-                   is_widened last last_force last_out last_rate last_up mean_acceleration nominal plausibility \
-                   position report residuals rest since_force surroundings velocity vertical wants_level";
-        assert_eq!(keys, all.split_whitespace().collect::<Vec<_>>());
-        text["of_a_later_release"] = 1.into();
-        let why = serde_json::from_value::<Memory>(text)
-            .unwrap_err()
-            .to_string();
-        assert!(why.contains("unknown field `of_a_later_release`"), "{why}");
+        let (propagation, memory) = whole.memory().unwrap();
+        let of_filter = "calibration correction covariance disturbance fields forces gaps_in_a_row given interval \
+                         is_started is_widened last last_force last_out last_rate last_up mean_acceleration nominal \
+                         plausibility position report residuals rest since_force surroundings velocity vertical \
+                         wants_level";
+        let of_propagator = "added attitude before covariance excess initial last next now open rates resets samples \
+                             sum waiting world_since";
+        let texts = [
+            (serde_json::to_value(&memory).unwrap(), of_filter),
+            (serde_json::to_value(&propagation).unwrap(), of_propagator),
+        ];
+        for (mut text, all) in texts {
+            let keys: Vec<&String> = text.as_object().unwrap().keys().collect();
+            assert_eq!(keys, all.split_whitespace().collect::<Vec<_>>());
+            text["of_a_later_release"] = 1.into();
+            let whys = [
+                serde_json::from_value::<Memory>(text.clone()).unwrap_err(),
+                serde_json::from_value::<propagate::Memory>(text).unwrap_err(),
+            ];
+            let unknown = |why: &serde_json::Error| {
+                why.to_string()
+                    .contains("unknown field `of_a_later_release`")
+            };
+            assert!(whys.iter().any(unknown), "{whys:?}");
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 //! A stage of its own because it looks at one sample alone: what comes behind it compares
 //! samples with each other and may rely on every number being finite and every stamp subtractable.
 
+#[cfg(feature = "serde")]
+use super::memory;
 use super::settings::Settings;
 use super::truncation::undone;
 use crate::record::{Nanos, RawSample, SampleKind, Status, Verdict};
@@ -20,6 +22,11 @@ pub(super) const MAX_STAMP: i64 = i64::MAX / 2;
 
 /// A sample that passed the gate; its stamp may still be out of order.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "memory::Row", into = "memory::Row")
+)]
 pub(super) struct Entry {
     pub(super) stamp: Nanos,
     pub(super) log: Nanos,

@@ -3,18 +3,17 @@
 //! Apart from the conditioner because it is read by another process: nothing in it is believed
 //! unseen. Samples that have left are not kept: whoever sends them again is told by the stamps.
 
-use super::gate::{Entry, MAX_STAMP, NO_ACCEL, finite_accel};
+use super::clock::IndexClock;
+use super::gate::{Entry, HUGE_RATE, MAX_STAMP, NO_ACCEL, finite_accel};
 use super::spacing::Steps;
 use super::timing::Previous;
-use super::{Conditioner, Report};
+use super::{Conditioner, Report, State, order};
+use crate::plausible::are_numbers;
 use crate::record::{Nanos, RawSample, Status, Verdict};
 use nalgebra::Vector3;
 
 /// Most samples that wait for what follows them.
 const MOST_WAITING: usize = 16;
-
-/// Largest value of a sample, whatever its unit.
-const LARGEST: f64 = 1e9;
 
 /// State of a conditioner at one moment; [`Conditioner::recall`] restores it.
 #[derive(Clone, PartialEq, Debug)]
@@ -24,59 +23,54 @@ const LARGEST: f64 = 1e9;
     serde(deny_unknown_fields)
 )]
 pub struct Memory {
-    /// Samples so far, and the stamp of the first where the clock counts samples.
-    index: u64,
-    index_base: Option<i64>,
-    /// Stamp that `--start` and `--until` are counted from.
-    trimmed_from: Option<i64>,
-    rejected: bool,
-    epoch: u32,
-    high: Option<i64>,
-    floor: Option<i64>,
-    /// Older than the newest; and not older, but not yet timed.
-    suspects: Vec<Row>,
-    untimed: Vec<Row>,
-    previous: Option<Before>,
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    state: State,
+    /// Stamp of the first sample where the clock counts samples.
+    index_base: Option<Nanos>,
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    order: order::State,
+    /// Not older than the newest, but not yet timed.
+    untimed: Vec<Entry>,
+    previous: Option<Previous>,
     steps: Steps,
-    first: Option<i64>,
-    last: Option<i64>,
+    first: Option<Nanos>,
+    last: Option<Nanos>,
 }
 
 /// Stamp, start, value, epoch.
-type Before = (i64, i64, [f64; 3], u32);
+pub(super) type Before = (i64, i64, [f64; 3], u32);
 
 /// Stamp, log time, value, specific force, interval (0: none), epoch, status bits.
-type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
+pub(super) type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
 
 impl Memory {
     /// Whether a conditioner can have known it, whatever the settings.
     pub(crate) fn is_plausible(&self) -> bool {
+        let (order, previous) = (&self.order, self.previous.as_slice());
         let stamps = [
             self.index_base,
-            self.trimmed_from,
-            self.high,
-            self.floor,
+            self.state.trimmed_from,
+            order.high,
+            order.floor,
             self.first,
             self.last,
         ];
-        let rows = || self.suspects.iter().chain(&self.untimed);
+        let entries = || order.suspects.iter().chain(&self.untimed);
         stamps
             .into_iter()
             .flatten()
-            .chain(rows().map(|row| row.0))
-            .chain(self.previous.iter().flat_map(|p| [p.0, p.1]))
-            .all(|stamp| stamp.unsigned_abs() <= MAX_STAMP as u64)
-            && rows().all(|row| row.2.iter().all(|v| v.abs() <= 2e4))
-            && self
-                .previous
-                .iter()
-                .all(|p| p.2.iter().all(|v| v.abs() <= LARGEST))
+            .chain(entries().map(|entry| entry.stamp))
+            .chain(previous.iter().flat_map(|p| [p.stamp, p.start]))
+            .all(|stamp| stamp.0.unsigned_abs() <= MAX_STAMP as u64)
+            // That of the gate, between other axes.
+            && entries().all(|entry| entry.value.amax() <= 2.0 * HUGE_RATE)
+            && previous.iter().all(|p| are_numbers(&p.value))
     }
 
     /// The last stamp that was used.
     #[must_use]
     pub fn last(&self) -> Option<Nanos> {
-        self.last.map(Nanos)
+        self.last
     }
 }
 
@@ -84,30 +78,20 @@ impl Conditioner {
     /// Returns the state; `None` before the first sample, and while more of them wait than is worth keeping.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
-        let untimed = self.order.untimed();
-        let waiting = untimed.len().max(self.order.suspects().len());
+        let (order, untimed) = (self.order.state(), self.order.untimed());
+        let waiting = untimed.len().max(order.suspects.len());
         if self.zero.is_some() || !self.primed || waiting > MOST_WAITING {
             return None;
         }
-        let nanos = |stamp: Option<Nanos>| stamp.map(|s| s.0);
-        let rows = |entries: &[Entry]| entries.iter().map(row).collect();
         Some(Memory {
-            index: self.index,
-            index_base: self.index_clock.as_ref().and_then(|c| nanos(c.base())),
-            trimmed_from: nanos(self.first_stamp),
-            rejected: self.rejected,
-            epoch: self.order.epoch(),
-            high: nanos(self.order.high()),
-            floor: nanos(self.order.floor()),
-            suspects: rows(self.order.suspects()),
-            untimed: rows(untimed),
-            previous: self
-                .timing
-                .previous()
-                .map(|p| (p.stamp.0, p.start.0, p.value.into(), p.epoch)),
+            state: self.state.clone(),
+            index_base: self.index_clock.as_ref().and_then(IndexClock::base),
+            order: order.clone(),
+            untimed: untimed.to_vec(),
+            previous: self.timing.previous(),
             steps: self.timing.steps(),
-            first: nanos(self.report.first),
-            last: nanos(self.report.last),
+            first: self.report.first,
+            last: self.report.last,
         })
     }
 
@@ -116,41 +100,27 @@ impl Conditioner {
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
         let can_be = memory.is_plausible()
-            && memory.suspects.len().max(memory.untimed.len()) <= MOST_WAITING
-            && memory.untimed.is_sorted_by_key(|row| (row.5, row.0))
-            && memory.index < u64::MAX / 4
+            && memory.order.suspects.len().max(memory.untimed.len()) <= MOST_WAITING
+            && memory
+                .untimed
+                .is_sorted_by_key(|entry| (entry.epoch, entry.stamp))
+            && memory.state.index < u64::MAX / 4
             && memory.index_base.is_some() == self.index_clock.is_some();
         if !can_be || !self.timing.set_steps(&memory.steps) {
             return false;
         }
-        self.index = memory.index;
         if let (Some(clock), Some(base)) = (&mut self.index_clock, memory.index_base) {
-            clock.count_from(Nanos(base));
+            clock.count_from(base);
         }
-        self.first_stamp = memory.trimmed_from.map(Nanos);
-        self.rejected = memory.rejected;
+        self.state = memory.state.clone();
         self.zero = None;
         self.primed = true;
         self.hold = self.window;
-        self.order.recall(
-            memory.untimed.iter().map(entry).collect(),
-            memory.suspects.iter().map(entry).collect(),
-            memory.epoch,
-            memory.high.map(Nanos),
-            memory.floor.map(Nanos),
-        );
-        self.timing.set_previous(
-            memory
-                .previous
-                .map(|(stamp, start, value, epoch)| Previous {
-                    stamp: Nanos(stamp),
-                    start: Nanos(start),
-                    value: Vector3::from(value),
-                    epoch,
-                }),
-        );
-        self.report.first = memory.first.map(Nanos);
-        self.report.last = memory.last.map(Nanos);
+        self.order
+            .recall(memory.order.clone(), memory.untimed.clone());
+        self.timing.set_previous(memory.previous);
+        self.report.first = memory.first;
+        self.report.last = memory.last;
         true
     }
 
@@ -175,31 +145,115 @@ impl Conditioner {
 
     /// A sample came that its sender has sent before: it is counted, and nothing else.
     pub(crate) fn push_late(&mut self, stamp: Nanos) {
-        self.report.note(Verdict::Late, self.index, Some(stamp));
+        self.report
+            .note(Verdict::Late, self.state.index, Some(stamp));
     }
 }
 
-fn row(entry: &Entry) -> Row {
-    (
-        entry.stamp.0,
-        entry.log.0,
-        entry.value.into(),
-        finite_accel(&entry.accel).map(Into::into),
-        entry.interval,
-        entry.epoch,
-        entry.status.0,
-    )
+impl From<Previous> for Before {
+    fn from(previous: Previous) -> Before {
+        let Previous {
+            stamp,
+            start,
+            value,
+            epoch,
+        } = previous;
+        (stamp.0, start.0, value.into(), epoch)
+    }
 }
 
-fn entry(&(stamp, log, value, accel, interval, epoch, status): &Row) -> Entry {
-    Entry {
-        stamp: Nanos(stamp),
-        log: Nanos(log),
-        value: Vector3::from(value),
-        accel: accel.map_or(NO_ACCEL, Vector3::from),
-        interval: interval.max(0),
-        index: 0,
-        epoch,
-        status: Status(status),
+impl From<Before> for Previous {
+    fn from((stamp, start, value, epoch): Before) -> Previous {
+        Previous {
+            stamp: Nanos(stamp),
+            start: Nanos(start),
+            value: Vector3::from(value),
+            epoch,
+        }
+    }
+}
+
+impl From<Entry> for Row {
+    fn from(entry: Entry) -> Row {
+        (
+            entry.stamp.0,
+            entry.log.0,
+            entry.value.into(),
+            finite_accel(&entry.accel).map(Into::into),
+            entry.interval,
+            entry.epoch,
+            entry.status.0,
+        )
+    }
+}
+
+/// The same measurement as far as it is saved, with or without a specific force.
+impl PartialEq for Entry {
+    fn eq(&self, other: &Entry) -> bool {
+        Row::from(*self) == Row::from(*other)
+    }
+}
+
+impl From<Row> for Entry {
+    fn from((stamp, log, value, accel, interval, epoch, status): Row) -> Entry {
+        Entry {
+            stamp: Nanos(stamp),
+            log: Nanos(log),
+            value: Vector3::from(value),
+            accel: accel.map_or(NO_ACCEL, Vector3::from),
+            interval: interval.max(0),
+            index: 0,
+            epoch,
+            status: Status(status),
+        }
+    }
+}
+
+#[cfg(all(test, feature = "serde"))]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::condition::Settings;
+
+    #[test]
+    fn what_is_remembered_goes_on_to_the_bit_and_the_keys_of_a_state_file_stay() {
+        // A stamp of the fifth was overtaken by two, and the eleventh waits for what follows.
+        let raw = |n: i64| RawSample {
+            header: Some(Nanos(1 + 1_000_000 * [n, n + 3][usize::from(n % 10 == 5)])),
+            gyro: Some([n as f64 * 1e-3, 0.1, 0.2]),
+            accel: (n % 2 == 0).then_some([0.0, 0.0, 9.8]),
+            ..RawSample::default()
+        };
+        let settings = Settings {
+            reorder_window: Settings::LIVE_WINDOW,
+            ..Settings::default()
+        };
+        let fresh = || Conditioner::new(&settings).unwrap();
+        for cut in [3, 6, 7, 8, 40, 127] {
+            let (mut whole, mut other) = (fresh(), fresh());
+            let fed = |conditioner: &mut Conditioner, samples: std::ops::Range<i64>| {
+                let mut out = Vec::new();
+                conditioner.push(&samples.map(raw).collect::<Vec<_>>(), &mut out);
+                out
+            };
+            let _ = fed(&mut whole, 0..cut);
+            let memory = whole.memory().unwrap();
+            let mut text = serde_json::to_value(&memory).unwrap();
+            let again: Memory = serde_json::from_value(text.clone()).unwrap();
+            assert_eq!(again, memory);
+            assert!(other.recall(&again));
+            assert_eq!(
+                fed(&mut other, cut..200),
+                fed(&mut whole, cut..200),
+                "{cut}"
+            );
+
+            let keys: Vec<&String> = text.as_object().unwrap().keys().collect();
+            let all = "epoch first floor high index index_base last previous rejected steps suspects trimmed_from \
+                       untimed";
+            assert_eq!(keys, all.split_whitespace().collect::<Vec<_>>());
+            text["of_a_later_release"] = 1.into();
+            assert!(serde_json::from_value::<Memory>(text).is_err());
+        }
     }
 }

@@ -53,17 +53,24 @@ pub(super) struct Order {
     pub(super) cursor: usize,
     /// Index in `line` where the current epoch begins.
     pub(super) epoch_from: usize,
-    epoch: u32,
-    /// Newest stamp of the current epoch.
-    high: Option<Nanos>,
-    /// Older than `high`, in order of arrival.
-    suspects: Vec<Entry>,
-    /// Last stamp given to a sample of the current epoch.
-    floor: Option<Nanos>,
+    state: State,
     max_run: usize,
     max_gap_nanos: i64,
     /// Nothing waits to be put in order.
     is_live: bool,
+}
+
+/// State of an [`Order`] beside its line. A new field is added here alone, with `serde(default)`.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct State {
+    pub(super) epoch: u32,
+    /// Newest stamp of the current epoch.
+    pub(super) high: Option<Nanos>,
+    /// Last stamp given to a sample of the current epoch.
+    pub(super) floor: Option<Nanos>,
+    /// Older than `high`, in order of arrival.
+    pub(super) suspects: Vec<Entry>,
 }
 
 impl Past {
@@ -87,10 +94,7 @@ impl Order {
             line: Vec::new(),
             cursor: 0,
             epoch_from: 0,
-            epoch: 0,
-            high: None,
-            suspects: Vec::new(),
-            floor: None,
+            state: State::default(),
             max_run: window.max(MAX_RUN),
             max_gap_nanos,
             is_live: window == 0,
@@ -98,19 +102,11 @@ impl Order {
     }
 
     pub(super) fn high(&self) -> Option<Nanos> {
-        self.high
+        self.state.high
     }
 
-    pub(super) fn epoch(&self) -> u32 {
-        self.epoch
-    }
-
-    pub(super) fn floor(&self) -> Option<Nanos> {
-        self.floor
-    }
-
-    pub(super) fn suspects(&self) -> &[Entry] {
-        &self.suspects
+    pub(super) fn state(&self) -> &State {
+        &self.state
     }
 
     /// Entries in the line that were not timed yet.
@@ -118,36 +114,28 @@ impl Order {
         self.line.get(self.cursor..).unwrap_or_default()
     }
 
-    /// Goes on with these in place of what there was.
-    pub(super) fn recall(
-        &mut self,
-        untimed: Vec<Entry>,
-        suspects: Vec<Entry>,
-        epoch: u32,
-        high: Option<Nanos>,
-        floor: Option<Nanos>,
-    ) {
-        let current = untimed.iter().position(|e| e.epoch == epoch);
+    /// Goes on from this state and these entries instead of its own.
+    pub(super) fn recall(&mut self, state: State, untimed: Vec<Entry>) {
+        let current = untimed.iter().position(|e| e.epoch == state.epoch);
         self.epoch_from = current.unwrap_or(untimed.len());
         self.cursor = 0;
         self.past.clear();
         self.line = untimed;
-        (self.suspects, self.epoch) = (suspects, epoch);
-        (self.high, self.floor) = (high, floor);
+        self.state = state;
     }
 
     /// The sample of `epoch` that was timed last got this stamp: nothing can be put in before it.
     #[inline]
     pub(super) fn timed(&mut self, stamp: Nanos, epoch: u32) {
-        if epoch == self.epoch {
-            self.floor = Some(stamp);
+        if epoch == self.state.epoch {
+            self.state.floor = Some(stamp);
         }
     }
 
     /// Takes the next entry; `spacing` is the ordinary step.
     #[inline(always)]
     pub(super) fn arrive(&mut self, entry: Entry, spacing: Option<i64>, report: &mut Report) {
-        if self.suspects.is_empty() && self.high.is_none_or(|high| entry.stamp > high) {
+        if self.state.suspects.is_empty() && self.state.high.is_none_or(|high| entry.stamp > high) {
             self.append(entry);
         } else {
             self.arrive_unordered(entry, spacing, report);
@@ -156,8 +144,8 @@ impl Order {
 
     #[inline(always)]
     fn append(&mut self, mut entry: Entry) {
-        entry.epoch = self.epoch;
-        self.high = Some(entry.stamp);
+        entry.epoch = self.state.epoch;
+        self.state.high = Some(entry.stamp);
         let most = match self.is_live {
             true => COMPACT_LIVE_AT,
             false => COMPACT_AT,
@@ -179,7 +167,10 @@ impl Order {
             // Not doubled: there are many of these.
             self.past
                 .reserve_exact(FORGET_AT.saturating_sub(self.past.len()));
-            let of_epoch = self.line.drain(..gone).filter(|e| e.epoch == self.epoch);
+            let of_epoch = self
+                .line
+                .drain(..gone)
+                .filter(|e| e.epoch == self.state.epoch);
             self.past.extend(of_epoch.map(|e| Past::of(&e)));
             gone
         } else {
@@ -193,13 +184,13 @@ impl Order {
 
     #[cold]
     fn arrive_unordered(&mut self, entry: Entry, spacing: Option<i64>, report: &mut Report) {
-        let Some(high) = self.high else {
+        let Some(high) = self.state.high else {
             return self.append(entry);
         };
         if entry.stamp <= high && self.is_repeat(&entry) {
             return report.note(Verdict::Repeated, entry.index, Some(entry.stamp));
         }
-        if self.suspects.is_empty() {
+        if self.state.suspects.is_empty() {
             if entry.stamp == high {
                 if self.collisions_at(high) < MAX_COLLISION {
                     self.append(entry);
@@ -207,11 +198,11 @@ impl Order {
                     report.note(Verdict::DuplicateStamp, entry.index, Some(entry.stamp));
                 }
             } else {
-                self.suspects.push(entry);
+                self.state.suspects.push(entry);
             }
         } else if entry.stamp <= high {
-            self.suspects.push(entry);
-            if self.suspects.len() > self.max_run {
+            self.state.suspects.push(entry);
+            if self.state.suspects.len() > self.max_run {
                 self.resolve_long_run(spacing, report);
             }
         } else if self.was_set_back(entry.stamp, high, spacing) {
@@ -226,7 +217,7 @@ impl Order {
     /// Ends the stream: no more entries come.
     pub(super) fn finish(&mut self, spacing: Option<i64>, report: &mut Report) {
         let misfits = self.misfits(spacing);
-        if misfits >= MIN_RUN && misfits == self.suspects.len() {
+        if misfits >= MIN_RUN && misfits == self.state.suspects.len() {
             self.begin_epoch(spacing, report);
         }
         // In the new epoch there can be overtaken samples again.
@@ -248,7 +239,12 @@ impl Order {
             return true;
         }
         line.iter()
-            .chain(self.suspects.iter().filter(|e| e.stamp == entry.stamp))
+            .chain(
+                self.state
+                    .suspects
+                    .iter()
+                    .filter(|e| e.stamp == entry.stamp),
+            )
             .take(LOOKED_THROUGH)
             .any(|e| e.same_data(entry))
     }
@@ -297,17 +293,17 @@ impl Order {
             };
             before < s.stamp && after.since(before) >= hole
         };
-        self.suspects.iter().filter(|s| !fits(s)).count()
+        self.state.suspects.iter().filter(|s| !fits(s)).count()
     }
 
     /// Whether a stream that reaches `next`, beyond `high`, carries on from the suspects.
     fn was_set_back(&self, next: Nanos, high: Nanos, spacing: Option<i64>) -> bool {
-        let (Some(spacing), Some(suspect)) = (spacing, self.suspects.last()) else {
+        let (Some(spacing), Some(suspect)) = (spacing, self.state.suspects.last()) else {
             return false;
         };
         let off = |from: Nanos| next.since(from).saturating_sub(spacing).saturating_abs();
-        self.suspects.len() >= MIN_RUN
-            && self.misfits(Some(spacing)) * 2 > self.suspects.len()
+        self.state.suspects.len() >= MIN_RUN
+            && self.misfits(Some(spacing)) * 2 > self.state.suspects.len()
             && off(suspect.stamp) <= off(high)
     }
 
@@ -318,11 +314,11 @@ impl Order {
             for stray in self.line.split_off(self.line.len() - strays) {
                 report.note(Verdict::StrayStamp, stray.index, Some(stray.stamp));
             }
-            self.high = match self.current().last() {
+            self.state.high = match self.current().last() {
                 Some(entry) => Some(entry.stamp),
                 None => self.past.last().map(|p| p.stamp),
             };
-            for entry in std::mem::take(&mut self.suspects) {
+            for entry in std::mem::take(&mut self.state.suspects) {
                 self.arrive(entry, spacing, report);
             }
         } else {
@@ -333,7 +329,7 @@ impl Order {
     /// Number of entries at the end of the line, none of them timed yet, that leap ahead so that the
     /// suspects carry on from the entry before them.
     fn strays_at_end(&self) -> Option<usize> {
-        let first = self.suspects.first()?.stamp;
+        let first = self.state.suspects.first()?.stamp;
         let untimed = self.line.get(self.cursor.max(self.epoch_from)..)?;
         (1..=untimed.len().min(MAX_STRAYS)).find(|strays| {
             let cut = self.line.len() - strays;
@@ -351,32 +347,32 @@ impl Order {
                     step > 0 && step <= self.max_gap_nanos && leap(before)
                 }
                 // Nothing but the stray in this epoch: the suspects are the stream.
-                None => *strays == 1 && self.epoch == 0 && leap(first),
+                None => *strays == 1 && self.state.epoch == 0 && leap(first),
             }
         })
     }
 
     /// The clock was set back: the line so far is complete, the suspects begin a new epoch.
     fn begin_epoch(&mut self, spacing: Option<i64>, report: &mut Report) {
-        self.epoch = self.epoch.wrapping_add(1);
+        self.state.epoch = self.state.epoch.wrapping_add(1);
         self.epoch_from = self.line.len();
         self.past.clear();
-        self.high = None;
-        self.floor = None;
-        for entry in std::mem::take(&mut self.suspects) {
+        self.state.high = None;
+        self.state.floor = None;
+        for entry in std::mem::take(&mut self.state.suspects) {
             self.arrive(entry, spacing, report);
         }
     }
 
     /// The suspects were overtaken: each goes to its place, unless time has passed it.
     fn put_back(&mut self, report: &mut Report) {
-        for mut entry in std::mem::take(&mut self.suspects) {
-            if self.floor.is_some_and(|floor| entry.stamp <= floor) {
+        for mut entry in std::mem::take(&mut self.state.suspects) {
+            if self.state.floor.is_some_and(|floor| entry.stamp <= floor) {
                 report.note(Verdict::Late, entry.index, Some(entry.stamp));
             } else if self.collisions_at(entry.stamp) >= MAX_COLLISION {
                 report.note(Verdict::DuplicateStamp, entry.index, Some(entry.stamp));
             } else {
-                entry.epoch = self.epoch;
+                entry.epoch = self.state.epoch;
                 entry.status = entry.status.with(Status::REORDERED);
                 let from = self.cursor.max(self.epoch_from);
                 let untimed = self.line.get(from..).unwrap_or_default();

@@ -4,6 +4,8 @@
 //! interval, says whether something before it is missing, and never shares its instant.
 
 use super::gate::{Entry, finite_accel};
+#[cfg(feature = "serde")]
+use super::memory;
 use super::report::{Gap, Report};
 use super::settings::{OnGap, Settings};
 use super::spacing::{Spacing, Steps};
@@ -25,7 +27,12 @@ const COARSE: usize = 3;
 const COARSE_STAMPS: usize = 4;
 
 /// The sample before.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "memory::Before", into = "memory::Before")
+)]
 pub(super) struct Previous {
     pub(super) stamp: Nanos,
     pub(super) start: Nanos,

@@ -5,11 +5,14 @@
 //! on a body turning with the Earth 1e-17 instead of 2e-11 (`docs/theory/attitude.md` 5). It is normalised on
 //! output, never in the recursion, where normalising makes constant rotation worse.
 
+use crate::plausible::is_unit;
 use crate::quaternion::kernel;
 
 /// Attitude q_nb under accumulation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Accumulator {
+    #[cfg_attr(feature = "serde", serde(rename = "attitude"))]
     q: [f64; 4],
     /// Excess of `q` over what was accumulated.
     excess: [f64; 4],
@@ -24,14 +27,9 @@ impl Accumulator {
         }
     }
 
-    /// The quaternion before it is normalised, and what is in it too much.
-    pub(crate) fn parts(&self) -> ([f64; 4], [f64; 4]) {
-        (self.q, self.excess)
-    }
-
-    /// Restores what [`parts`](Self::parts) returned.
-    pub(crate) fn from_parts(q: [f64; 4], excess: [f64; 4]) -> Self {
-        Accumulator { q, excess }
+    /// Whether it can have come about.
+    pub(crate) fn is_plausible(&self) -> bool {
+        is_unit(&self.q) && self.excess.iter().all(|c| c.abs() < 1e-6)
     }
 
     /// Turns on by `[cos(a/2) - 1, x, y, z]`, about body axes: the increment multiplies on the right.

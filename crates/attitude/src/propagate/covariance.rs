@@ -30,6 +30,7 @@ mod noise;
 
 pub use noise::Noise;
 
+use crate::plausible::{are_numbers, is_amount, is_covariance};
 use crate::quaternion::{RotationVector, exp_minus_one};
 use crate::record::AttitudeCovariance;
 use matrix::{PLACES, Rows, Transition, Triangle, ZERO};
@@ -62,21 +63,9 @@ const LOST: f64 = std::f64::consts::PI;
 pub struct Covariance {
     noise: Noise,
     kind: Kind,
-    /// The part of the attitude's covariance that is this times the identity, rad^2.
-    alike: f64,
     /// White noise equal about all axes, rad^2/s.
     alike_arw: f64,
-    /// `B`: attitude error made by a bias that does not change is `-B b`, s.
-    turned: Rows,
-    /// The rest of the attitude's covariance, rad^2.
-    attitude: Triangle,
-    /// Covariance of attitude (rows) and bias (columns), rad^2/s.
-    cross: Rows,
-    /// Variance of the bias, (rad/s)^2.
-    bias: [f64; 3],
-    /// `D`: attitude error made by each entry of G, by the component of the turn it multiplies.
-    distorted: [Rows; 3],
-    is_distorted: bool,
+    state: State,
 }
 
 /// Pieces that move.
@@ -110,17 +99,20 @@ impl Covariance {
         } else {
             noise.arw[0] * noise.arw[0]
         };
+        let is_distorted = noise.scale != 0.0 || noise.misalignment != 0.0;
         let mut covariance = Covariance {
             noise,
             kind,
-            alike: 0.0,
             alike_arw,
-            turned: ZERO,
-            attitude: [0.0; 6],
-            cross: ZERO,
-            bias: noise.bias.map(|b| b * b),
-            distorted: [ZERO; 3],
-            is_distorted: noise.scale != 0.0 || noise.misalignment != 0.0,
+            state: State {
+                resumed: false,
+                alike: 0.0,
+                turned: ZERO,
+                attitude: [0.0; 6],
+                cross: ZERO,
+                bias: noise.bias.map(|b| b * b),
+                distorted: is_distorted.then_some([ZERO; 3]),
+            },
         };
         covariance.restart();
         covariance
@@ -134,8 +126,8 @@ impl Covariance {
     /// Same as [`step`](Self::step), by `[cos(a/2) - 1, sin(a/2) axis]`.
     #[inline(always)]
     pub(crate) fn advance(&mut self, turn: [f64; 4], secs: f64) {
-        self.alike += self.alike_arw * secs;
-        if self.kind == Kind::Alike && !self.is_distorted {
+        self.state.alike += self.alike_arw * secs;
+        if self.kind == Kind::Alike && self.state.distorted.is_none() {
             return;
         }
         let transition = Transition::of(turn);
@@ -143,26 +135,26 @@ impl Covariance {
             Kind::Alike => {}
             Kind::ConstantBias => {
                 let Transition { back, mean } = transition;
-                let mut turned = product(&back, &self.turned);
+                let mut turned = product(&back, &self.state.turned);
                 for i in 0..3 {
                     for j in 0..3 {
                         turned[i][j] += secs * mean[i][j];
                     }
                 }
-                self.turned = turned;
+                self.state.turned = turned;
             }
             Kind::Wandering => self.wander(&transition, secs),
         }
-        if self.is_distorted {
-            self.distort(&transition, turn);
-        }
+        self.distort(&transition, turn);
     }
 
     /// Adds the effect of errors of scale and axes on a turn.
+    #[inline(always)]
     fn distort(&mut self, Transition { back, mean }: &Transition, turn: [f64; 4]) {
         // The rotation vector: twice the sine of its half is 4 % short of it at a rad, which sigma does not show.
         let [_, x, y, z] = turn;
-        for (distorted, component) in self.distorted.iter_mut().zip([x, y, z]) {
+        let distorted = self.state.distorted.iter_mut().flatten();
+        for (distorted, component) in distorted.zip([x, y, z]) {
             let mut next = product(back, distorted);
             for (row, mean) in next.iter_mut().zip(mean) {
                 for (entry, mean) in row.iter_mut().zip(mean) {
@@ -177,7 +169,7 @@ impl Covariance {
     fn distortion(&self) -> Triangle {
         let (scale, beside) = (self.noise.scale.powi(2), self.noise.misalignment.powi(2));
         let mut sum = [0.0; 6];
-        for (k, distorted) in self.distorted.iter().enumerate() {
+        for (k, distorted) in self.state.distorted.iter().flatten().enumerate() {
             let mut variances = [beside; 3];
             variances[k] = scale;
             let part = congruent_diagonal(distorted, variances);
@@ -201,10 +193,10 @@ impl Covariance {
         let axis = |f: &dyn Fn(usize) -> f64| [f(0), f(1), f(2)];
 
         let before = congruent(back, &self.halfway(secs));
-        let carried = product(back, &self.cross);
+        let carried = product(back, &self.state.cross);
         let swept = columns_times(
             &step,
-            axis(&|i| 0.5 * (held * held * self.bias[i] + driven[i] * own_attitude)),
+            axis(&|i| 0.5 * (held * held * self.state.bias[i] + driven[i] * own_attitude)),
         );
         // P = R^T P R + H + H^T with H = (G diag/2 - held R^T X) G^T.
         let mut half = ZERO;
@@ -214,27 +206,27 @@ impl Covariance {
             }
         }
         for (n, (i, j)) in PLACES.into_iter().enumerate() {
-            self.attitude[n] = before[n]
+            self.state.attitude[n] = before[n]
                 + (product_transposed(&half, &step, (i, j))
                     + product_transposed(&half, &step, (j, i)));
         }
-        self.attitude = self.halfway(secs);
+        self.state.attitude = self.halfway(secs);
         let added = columns_times(
             &step,
-            axis(&|i| alpha * held * self.bias[i] + driven[i] * own_cross),
+            axis(&|i| alpha * held * self.state.bias[i] + driven[i] * own_cross),
         );
         for i in 0..3 {
             for j in 0..3 {
-                self.cross[i][j] = alpha * carried[i][j] - added[i][j];
+                self.state.cross[i][j] = alpha * carried[i][j] - added[i][j];
             }
-            self.bias[i] = alpha * alpha * self.bias[i] + driven[i] * own_bias;
+            self.state.bias[i] = alpha * alpha * self.state.bias[i] + driven[i] * own_bias;
         }
     }
 
     /// The attitude's part with half a step of white noise, where it differs between the axes.
     #[inline(always)]
     fn halfway(&self, secs: f64) -> Triangle {
-        let mut p = self.attitude;
+        let mut p = self.state.attitude;
         if self.alike_arw == 0.0 {
             for (place, arw) in [0, 3, 5].into_iter().zip(self.noise.arw) {
                 p[place] += 0.5 * secs * arw * arw;
@@ -246,38 +238,39 @@ impl Covariance {
     /// The attitude is the initial one again. What is known of the bias is not lost with it.
     pub(crate) fn restart(&mut self) {
         let initial = self.noise.initial.map(|s| s * s);
-        self.alike = 0.0;
-        self.attitude = [0.0; 6];
+        self.state.alike = 0.0;
+        self.state.attitude = [0.0; 6];
         if self.kind == Kind::Wandering {
             let [x, y, z] = initial;
-            self.attitude = [x, 0.0, 0.0, y, 0.0, z];
+            self.state.attitude = [x, 0.0, 0.0, y, 0.0, z];
         } else {
-            self.alike = initial[0];
+            self.state.alike = initial[0];
         }
-        self.turned = ZERO;
-        self.cross = ZERO;
-        self.distorted = [ZERO; 3];
+        self.state.turned = ZERO;
+        self.state.cross = ZERO;
+        self.state.distorted = self.state.distorted.map(|_| [ZERO; 3]);
     }
 
     /// The attitude is one that was known so well when it was saved. How its error hangs together with
     /// that of the bias was not saved, and is taken for nothing.
     pub(crate) fn resume(&mut self, saved: AttitudeCovariance) {
         self.restart();
+        self.state.resumed |= self.kind != Kind::Wandering;
         self.kind = Kind::Wandering;
-        self.alike = 0.0;
-        self.attitude = saved.upper();
+        self.state.alike = 0.0;
+        self.state.attitude = saved.upper();
     }
 
     /// Adds what a bridged gap may hide: rad^2 about every axis.
     pub(crate) fn bridge(&mut self, variance: f64) {
-        self.alike += variance;
+        self.state.alike += variance;
     }
 
     /// Adds what may have been turned about any axis in `secs` during which no sample was seen, were the
     /// rate kept, rad/s.
     pub(crate) fn hold(&mut self, rate: f64, secs: f64) {
         let turned = (rate * secs.max(0.0)).min(LOST);
-        self.alike += turned * turned;
+        self.state.alike += turned * turned;
         self.pass(secs);
     }
 
@@ -287,8 +280,9 @@ impl Covariance {
         let wander = Wander::over(secs, self.noise.bias_tau);
         for i in 0..3 {
             let driven = self.noise.rrw[i] * self.noise.rrw[i] * secs;
-            self.bias[i] = wander.alpha * wander.alpha * self.bias[i] + driven * wander.own_bias;
-            for row in &mut self.cross {
+            self.state.bias[i] =
+                wander.alpha * wander.alpha * self.state.bias[i] + driven * wander.own_bias;
+            for row in &mut self.state.cross {
                 row[i] *= wander.alpha;
             }
         }
@@ -301,16 +295,16 @@ impl Covariance {
     pub fn attitude(&self) -> AttitudeCovariance {
         let mut p = match self.kind {
             Kind::Alike => [0.0; 6],
-            Kind::ConstantBias => congruent_diagonal(&self.turned, self.bias),
-            Kind::Wandering => self.attitude,
+            Kind::ConstantBias => congruent_diagonal(&self.state.turned, self.state.bias),
+            Kind::Wandering => self.state.attitude,
         };
-        if self.is_distorted {
+        if self.state.distorted.is_some() {
             for (p, more) in p.iter_mut().zip(self.distortion()) {
                 *p += more;
             }
         }
         for place in [0, 3, 5] {
-            p[place] += self.alike;
+            p[place] += self.state.alike;
         }
         if p[0].max(p[3]).max(p[5]) >= LOST * LOST {
             capped(&mut p);
@@ -324,42 +318,48 @@ impl Covariance {
         let (p, cross) = match self.kind {
             Kind::Alike => ([0.0; 6], ZERO),
             Kind::ConstantBias => (
-                congruent_diagonal(&self.turned, self.bias),
-                columns_times(&self.turned, self.bias.map(|b| -b)),
+                congruent_diagonal(&self.state.turned, self.state.bias),
+                columns_times(&self.state.turned, self.state.bias.map(|b| -b)),
             ),
-            Kind::Wandering => (self.attitude, self.cross),
+            Kind::Wandering => (self.state.attitude, self.state.cross),
         };
         let mut m = Matrix6::zeros();
         let distortion = self.distortion();
         for (n, (i, j)) in PLACES.into_iter().enumerate() {
-            let value = p[n] + distortion[n] + if i == j { self.alike } else { 0.0 };
+            let value = p[n] + distortion[n] + if i == j { self.state.alike } else { 0.0 };
             (m[(i, j)], m[(j, i)]) = (value, value);
         }
         let cross = Matrix3::from_fn(|i, j| cross[i][j]);
         m.fixed_view_mut::<3, 3>(0, 3).copy_from(&cross);
         m.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross.transpose());
         for i in 0..3 {
-            m[(i + 3, i + 3)] = self.bias[i];
+            m[(i + 3, i + 3)] = self.state.bias[i];
         }
         m
     }
 }
 
-/// Moving part of a [`Covariance`], to go on from exactly.
-#[derive(Clone, PartialEq, Debug)]
+/// State of a [`Covariance`], which is saved as it is.
+#[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
     serde(deny_unknown_fields)
 )]
-pub struct Carried {
+pub(crate) struct State {
     /// Whether it was begun from a saved attitude: then all pieces move.
     resumed: bool,
+    /// The part of the attitude's covariance that is this times the identity, rad^2.
     alike: f64,
+    /// `B`: attitude error made by a bias that does not change is `-B b`, s.
     turned: Rows,
+    /// The rest of the attitude's covariance, rad^2.
     attitude: Triangle,
+    /// Covariance of attitude (rows) and bias (columns), rad^2/s.
     cross: Rows,
+    /// Variance of the bias, (rad/s)^2.
     bias: [f64; 3],
+    /// `D`: attitude error made by each entry of G, by the component of the turn it multiplies.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "Option::is_none")
@@ -367,59 +367,38 @@ pub struct Carried {
     distorted: Option<[Rows; 3]>,
 }
 
-impl Carried {
+impl State {
     /// Whether a covariance can have been so: what a file says may be anything.
     pub(crate) fn is_plausible(&self) -> bool {
-        /// Largest variance, product or time.
-        const LARGEST: f64 = 1e12;
-        /// Rounding of a variance of nothing.
-        const ROUNDING: f64 = 1e-12;
         let distorted = self.distorted.iter().flatten().flatten();
         let rows = self.turned.iter().chain(&self.cross).chain(distorted);
-        let mut numbers = rows.flatten().chain(&self.attitude).chain(&self.bias);
-        let variance = |place: usize| self.attitude[place] + self.alike.max(0.0);
-        // xx, xy, xz, yy, yz, zz.
-        let pairs = [(1, 0, 3), (2, 0, 5), (4, 3, 5)];
-        numbers.all(|v| v.abs() <= LARGEST)
-            && (0.0..=LARGEST).contains(&self.alike)
-            && self.bias.iter().all(|v| *v >= 0.0)
-            && [0, 3, 5].into_iter().all(|n| variance(n) >= -ROUNDING)
-            && pairs.into_iter().all(|(both, a, b)| {
-                let most = variance(a).max(0.0) * variance(b).max(0.0);
-                self.attitude[both].powi(2) <= most * (1.0 + 1e-6) + ROUNDING
-            })
+        let mut attitude = self.attitude;
+        for place in [0, 3, 5] {
+            attitude[place] += self.alike;
+        }
+        are_numbers(rows.flatten().chain(&self.attitude))
+            && is_amount(self.alike)
+            && self.bias.into_iter().all(is_amount)
+            && is_covariance(&attitude)
     }
 }
 
 impl Covariance {
-    /// Input of [`carry`](Self::carry).
-    pub(crate) fn carried(&self) -> Carried {
-        Carried {
-            resumed: self.kind != Covariance::new(self.noise).kind,
-            alike: self.alike,
-            turned: self.turned,
-            attitude: self.attitude,
-            cross: self.cross,
-            bias: self.bias,
-            distorted: self.is_distorted.then_some(self.distorted),
-        }
+    pub(crate) fn state(&self) -> State {
+        self.state
     }
 
-    /// Goes on from what another of the same noise has carried; `false` when that cannot be.
-    pub(crate) fn carry(&mut self, carried: &Carried) -> bool {
-        if !carried.is_plausible() || carried.distorted.is_some() != self.is_distorted {
-            return false;
+    /// Goes on from the state of another of the same noise; `false`, and nothing has changed, when that cannot be.
+    pub(crate) fn recall(&mut self, state: &State) -> bool {
+        let fits =
+            state.is_plausible() && state.distorted.is_some() == self.state.distorted.is_some();
+        if fits {
+            self.state = *state;
+            if state.resumed {
+                self.kind = Kind::Wandering;
+            }
         }
-        self.distorted = carried.distorted.unwrap_or([ZERO; 3]);
-        if carried.resumed {
-            self.kind = Kind::Wandering;
-        }
-        self.alike = carried.alike;
-        self.turned = carried.turned;
-        self.attitude = carried.attitude;
-        self.cross = carried.cross;
-        self.bias = carried.bias;
-        true
+        fits
     }
 }
 

@@ -84,6 +84,20 @@ pub(crate) struct Triple<const N: usize> {
     pub(crate) z: Lanes<N>,
 }
 
+impl From<[f64; 3]> for Triple<1> {
+    #[inline(always)]
+    fn from([x, y, z]: [f64; 3]) -> Self {
+        Triple::new(x, y, z)
+    }
+}
+
+impl From<Triple<1>> for [f64; 3] {
+    #[inline(always)]
+    fn from(triple: Triple<1>) -> Self {
+        [triple.x.0[0], triple.y.0[0], triple.z.0[0]]
+    }
+}
+
 impl<const N: usize> Triple<N> {
     pub(crate) const ZERO: Self = Triple {
         x: Lanes::ZERO,

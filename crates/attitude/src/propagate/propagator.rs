@@ -18,7 +18,7 @@ use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{AttitudeSample, Join, Measured, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
-use state::{State, Waiting};
+use state::{Output, Waiting};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -75,20 +75,17 @@ const LARGEST: f64 = 1e3;
 pub struct Propagator {
     method: Method,
     engine: Engine,
-    initial: [f64; 4],
     track: Track,
     /// Samples not yet output. Those that turn nothing come out with the attitude before them.
     queue: VecDeque<Waiting>,
     /// Element whose interval is integrated next.
     next: usize,
-    state: State,
+    output: Output,
     started: bool,
     /// The attitude is not that of this stream's beginning, but one that was saved.
     resumed: bool,
     /// Attitude of the next reset, if it is not the initial one.
     anew: Option<[f64; 4]>,
-    last_rate: [f64; 3],
-    last_stamp: i64,
     /// Provisional steps, kept for its memory.
     scratch: Vec<Step>,
 }
@@ -141,16 +138,13 @@ impl Propagator {
         Ok(Propagator {
             method,
             engine,
-            initial,
             track: Track::new(increments),
             queue: VecDeque::new(),
             next: 1,
-            state: State::new(&settings, initial),
+            output: Output::new(&settings, initial),
             started: false,
             resumed: false,
             anew: None,
-            last_rate: [0.0; 3],
-            last_stamp: 0,
             scratch: Vec::new(),
         })
     }
@@ -168,19 +162,19 @@ impl Propagator {
         if (norm - 1.0).abs() > 1e-6 || norm.is_nan() {
             return Err(SettingsError::Initial { wxyz });
         }
-        self.state.resume(last);
+        self.output.resume(last);
         self.resumed = true;
-        self.last_stamp = last.stamp.0;
+        self.output.state.last = last.stamp.0;
         if last.rate.0.iter().all(|w| w.abs() <= FASTEST) {
-            self.last_rate = last.rate.0.into();
+            self.output.state.rates.sample = last.rate.0.into();
         }
         Ok(())
     }
 
     /// Begins as the run after one that was reset so often: the first output says [`Status::RESET`].
     pub fn succeed(&mut self, resets: u32) {
-        self.state.reset_count = resets.saturating_add(1);
-        self.state.added = self.state.added.with(Status::RESET);
+        self.output.state.resets = resets.saturating_add(1);
+        self.output.state.added = self.output.state.added.with(Status::RESET);
     }
 
     /// The next sample that says [`Join::Reset`] begins with this attitude, and not with the initial one.
@@ -226,14 +220,14 @@ impl Propagator {
     /// Report of what has happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
-        let report = &self.state.report;
+        let report = &self.output.report;
         let tells = match &self.engine {
             Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan.tells_error(),
             Engine::Classical(_) => false,
         };
         Report {
-            integration_error: tells.then(|| self.state.difference.worst(report.angle_turned)),
-            integrated_secs: secs(self.state.integrated_nanos),
+            integration_error: tells.then(|| self.output.difference.worst(report.angle_turned)),
+            integrated_secs: secs(self.output.integrated_nanos),
             ..*report
         }
     }
@@ -259,35 +253,36 @@ impl Propagator {
         self.next = 1;
         let sample = self.trusted(sample);
         let resumed = std::mem::take(&mut self.resumed);
-        let first = self.state.report.samples == 0 && !resumed;
-        self.state.begin(sample.stamp.0);
+        let first = self.output.report.samples == 0 && !resumed;
+        self.output.begin(sample.stamp.0);
         if sample.join == Join::Reset {
-            self.state.reset(self.anew.take().unwrap_or(self.initial));
+            self.output
+                .reset(self.anew.take().unwrap_or(self.output.state.initial));
         }
         if !first {
-            self.state.reset_count = self.state.reset_count.saturating_add(1);
-            let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
+            self.output.state.resets = self.output.state.resets.saturating_add(1);
+            let gap = secs(sample.stamp.0.saturating_sub(self.output.state.last));
             let status = if sample.join == Join::Reset {
-                self.state.report.resets += 1;
-                self.state.covariance.pass(gap);
+                self.output.report.resets += 1;
+                self.output.covariance.pass(gap);
                 Status::RESET
             } else {
-                self.state.report.holds += 1;
-                let [x, y, z] = self.last_rate;
-                self.state
+                self.output.report.holds += 1;
+                let [x, y, z] = self.output.state.rates.sample;
+                self.output
                     .covariance
                     .hold(Vector3::new(x, y, z).norm(), gap);
                 Status::HELD
             };
-            self.state.added = self.state.added.with(status);
+            self.output.state.added = self.output.state.added.with(status);
         }
         if resumed {
-            self.state.added = self.state.added.with(Status::RESTARTED);
+            self.output.state.added = self.output.state.added.with(Status::RESTARTED);
         }
         self.started = true;
         self.append(&sample);
         let rate = self.track.rate(0);
-        self.state.output_at(&sample, Some(rate), out);
+        self.output.output_at(&sample, Some(rate), out);
     }
 
     /// Any later sample of a run.
@@ -297,11 +292,11 @@ impl Propagator {
         if std::mem::take(&mut self.resumed) && sample.join == Join::Bridge {
             sample.status = sample.status.with(Status::RESTARTED);
         }
-        let turns = sample.stamp.0 > self.last_stamp;
+        let turns = sample.stamp.0 > self.output.state.last;
         if turns {
             self.append(&sample);
         } else {
-            self.state.report.stalled += 1;
+            self.output.report.stalled += 1;
         }
         self.queue.push_back(Waiting { sample, turns });
     }
@@ -312,8 +307,8 @@ impl Propagator {
         self.track
             .push(sample.stamp.0, sample.start.0, value, bridged);
         let rate = self.track.rate(self.track.len() - 1);
-        self.last_rate = [rate.x.0[0], rate.y.0[0], rate.z.0[0]];
-        self.last_stamp = sample.stamp.0;
+        self.output.state.rates.sample = rate.into();
+        self.output.state.last = sample.stamp.0;
     }
 
     /// The sample, with a value that can be calculated with: one that is not finite, or that no gyro
@@ -328,10 +323,10 @@ impl Propagator {
         if sample.gyro.as_vector().iter().all(|v| v.abs() <= limit) {
             return *sample;
         }
-        self.state.report.rejected += 1;
+        self.output.report.rejected += 1;
         let mut sample = *sample;
         sample.status = sample.status.with(Status::REJECTED_BEFORE);
-        let [x, y, z] = self.last_rate;
+        let [x, y, z] = self.output.state.rates.sample;
         let factor = if self.track.increments {
             secs(sample.stamp.since(sample.start).max(0))
         } else {
@@ -361,7 +356,7 @@ impl Propagator {
         let gyro = match other {
             Measured::Increment(_) => Measured::Rate(sample.mean_rate()),
             Measured::Rate(rate) => {
-                let since = sample.stamp.0.saturating_sub(self.last_stamp).max(0);
+                let since = sample.stamp.0.saturating_sub(self.output.state.last).max(0);
                 let is_first = self.track.len() == 0;
                 Measured::Increment(rate.held_for(if is_first { 0.0 } else { secs(since) }))
             }
@@ -378,7 +373,7 @@ impl Propagator {
     fn advance(&mut self, ended: bool, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
         let known = self.known(ended);
         // Those at the front follow the sample output last.
-        self.state.flush_stalled(&mut self.queue, out);
+        self.output.flush_stalled(&mut self.queue, out);
         match &self.engine {
             Engine::Sliding(plan) => {
                 let (track, first) = (&self.track, self.next);
@@ -390,8 +385,8 @@ impl Propagator {
                 out.reserve(count);
                 for step in segments.iter().flatten() {
                     self.next += 1;
-                    self.state.step(step, &self.track, self.next - 1);
-                    self.state
+                    self.output.step(step, &self.track, self.next - 1);
+                    self.output
                         .emit(&mut self.queue, &self.track, self.next - 1, out);
                 }
             }
@@ -399,8 +394,8 @@ impl Propagator {
                 for k in self.next..known {
                     let step = classical::step(*method, &self.track, k);
                     self.next += 1;
-                    self.state.step(&step, &self.track, k);
-                    self.state.emit(&mut self.queue, &self.track, k, out);
+                    self.output.step(&step, &self.track, k);
+                    self.output.emit(&mut self.queue, &self.track, k, out);
                 }
             }
             Engine::Commit { .. } => {
@@ -460,10 +455,10 @@ impl Propagator {
             } else {
                 None
             };
-            let committed_at = self.state.now;
-            let mut ahead = self.state.attitude;
-            let mut covariance = self.state.covariance;
-            let mut difference = self.state.difference;
+            let committed_at = self.output.state.now;
+            let mut ahead = self.output.attitude;
+            let mut covariance = self.output.covariance;
+            let mut difference = self.output.difference;
             if newest >= self.next {
                 self.scratch.clear();
                 plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
@@ -479,22 +474,22 @@ impl Propagator {
                 }
                 covariance.advance(turned.parts(), span);
                 if let (true, Some(step)) = (turns, self.scratch.last()) {
-                    self.state.added = self.state.added.with(step.status());
+                    self.output.state.added = self.output.state.added.with(step.status());
                 }
             }
-            self.state.difference.seen(&difference);
-            let committed = (self.state.attitude, self.state.covariance);
-            (self.state.attitude, self.state.covariance) = (ahead, covariance);
-            self.state.now = self.track.stamp[newest];
+            self.output.difference.seen(&difference);
+            let committed = (self.output.attitude, self.output.covariance);
+            (self.output.attitude, self.output.covariance) = (ahead, covariance);
+            self.output.state.now = self.track.stamp[newest];
             if newest >= self.next {
-                self.state.added = self.state.added.with(Status::PROVISIONAL);
+                self.output.state.added = self.output.state.added.with(Status::PROVISIONAL);
                 if *finals {
                     open.push_back(Waiting { sample, turns });
                 }
             }
-            self.state.output_at(&sample, rate, out);
-            (self.state.attitude, self.state.covariance) = committed;
-            self.state.now = committed_at;
+            self.output.output_at(&sample, rate, out);
+            (self.output.attitude, self.output.covariance) = committed;
+            self.output.state.now = committed_at;
         }
     }
 
@@ -510,18 +505,18 @@ impl Propagator {
         for step in &self.scratch {
             let k = self.next;
             self.next += 1;
-            self.state.step(step, &self.track, k);
+            self.output.step(step, &self.track, k);
             if !self.queue.is_empty() && k + 1 == self.track.len() {
                 // Without look-ahead the newest is final at once, and its output is still to come.
                 break;
             }
             if *finals {
                 // The second output of the same samples: they count once.
-                let counted = self.state.report.samples;
-                self.state.emit(open, &self.track, k, out);
-                self.state.report.samples = counted;
+                let counted = self.output.report.samples;
+                self.output.emit(open, &self.track, k, out);
+                self.output.report.samples = counted;
             } else {
-                self.state.added = Status::OK;
+                self.output.state.added = Status::OK;
             }
         }
     }

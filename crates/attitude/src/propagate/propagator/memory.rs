@@ -3,12 +3,13 @@
 //! Apart from the propagator because it is read by another process: nothing in it is believed
 //! unseen. Of the samples only those are kept that a window may still hold.
 
+use super::state::State;
 use super::{Engine, FASTEST, LARGEST, LOOKED_BACK, Propagator, Waiting};
 use crate::frames::In;
+use crate::plausible::{are_numbers, is_unit};
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::classical::LOOK_BACK;
-use crate::propagate::covariance::Carried;
-use crate::propagate::lanes::Triple;
+use crate::propagate::covariance;
 use crate::quaternion::BodyRate;
 use crate::record::{Join, Measured, Nanos, RateSample, Status};
 use nalgebra::Vector3;
@@ -25,26 +26,12 @@ const MOST_WAITING: usize = 64;
     serde(deny_unknown_fields)
 )]
 pub struct Memory {
-    /// Attitude a reset goes to, w, x, y, z.
-    initial: [f64; 4],
-    /// Attitude accumulated, w, x, y, z: relative to the world, or to where that stood at
-    /// `world_since`.
-    attitude: [f64; 4],
-    /// Excess of the accumulated attitude.
-    excess: [f64; 4],
-    /// Sum of rotation vectors, rad, where the method sums those.
-    sum: Option<[f64; 3]>,
-    world_since: Option<i64>,
-    /// Instant of the attitude, ns.
-    now: i64,
-    covariance: Carried,
-    /// Bits of the next output.
-    added: u16,
-    resets: u32,
-    /// Rates of the last output, and of the last sample, rad/s.
-    rates: [[f64; 3]; 2],
-    /// Stamp of the last sample, ns: the others are counted back from it.
-    last: i64,
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    state: State,
+    /// Relative to the world, or to where that stood at `world_since`.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    attitude: Accumulator,
+    covariance: covariance::State,
     /// Samples of this run before those in `samples`.
     before: u64,
     /// Index in `samples` of the one that ends the next interval to be integrated.
@@ -64,22 +51,20 @@ type Row = (i64, Option<[f64; 3]>, u16, i64, bool);
 impl Memory {
     /// Whether a propagator can have known it, whatever the settings.
     pub(crate) fn is_plausible(&self) -> bool {
-        let unit = |q: &[f64; 4]| {
-            let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
-            (norm - 1.0).abs() < 1e-6
-        };
-        /// Largest sum of rotations and largest rate between two samples, rad, rad/s.
-        const MOST: f64 = 1e15;
-        let small = |v: &f64| v.abs() <= MOST;
-        unit(&self.attitude)
-            && unit(&self.initial)
-            && self.excess.iter().all(|c| c.abs() < 1e-6)
-            && self.sum.iter().flatten().all(small)
-            && self.rates.iter().flatten().all(small)
+        let State {
+            initial,
+            sum,
+            rates,
+            ..
+        } = &self.state;
+        is_unit(initial)
+            && self.attitude.is_plausible()
+            && are_numbers(sum.iter().flatten())
+            && are_numbers(rates.output.iter().chain(&rates.sample))
             && self
                 .samples
                 .iter()
-                .all(|e| e.1 >= 0 && [e.2, e.3, e.4].iter().all(small))
+                .all(|e| e.1 >= 0 && are_numbers(&[e.2, e.3, e.4]))
             && self.covariance.is_plausible()
     }
 }
@@ -95,7 +80,7 @@ impl Propagator {
         if !self.started || self.queue.len().max(open.len()) > MOST_WAITING {
             return None;
         }
-        let last = self.last_stamp;
+        let last = self.output.state.last;
         let row = |waiting: &Waiting| {
             let sample = &waiting.sample;
             let accel = sample.accel.map(|force| (*force.as_vector()).into());
@@ -104,19 +89,10 @@ impl Propagator {
         };
         let track = &self.track;
         let from = self.next.saturating_sub(self.looked_back());
-        let (attitude, excess) = self.state.attitude.parts();
         Some(Memory {
-            initial: self.initial,
-            attitude,
-            excess,
-            sum: self.state.sum.map(|s| [s.x.0[0], s.y.0[0], s.z.0[0]]),
-            world_since: self.state.world.map(|w| w.since()),
-            now: self.state.now,
-            covariance: self.state.covariance.carried(),
-            added: self.state.added.0,
-            resets: self.state.reset_count,
-            rates: [self.state.rate.into(), self.last_rate],
-            last,
+            state: self.output.state,
+            attitude: self.output.attitude,
+            covariance: self.output.covariance.state(),
             before: (track.base + from) as u64,
             next: self.next - from,
             samples: (from..track.len())
@@ -142,35 +118,27 @@ impl Propagator {
     /// `false`, and nothing has changed, when no propagator can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
-        let mut covariance = self.state.covariance;
-        let fits = self.can_be(memory) && covariance.carry(&memory.covariance);
+        let mut covariance = self.output.covariance;
+        let fits = self.can_be(memory) && covariance.recall(&memory.covariance);
         if !fits {
             return false;
         }
         self.track.clear();
         for &(age, length, x, y, z, bridged) in &memory.samples {
-            let stamp = memory.last.saturating_sub(age);
+            let stamp = memory.state.last.saturating_sub(age);
             let start = stamp.saturating_sub(length);
             self.track.push(stamp, start, [x, y, z], bridged);
         }
         self.track
             .count_from(usize::try_from(memory.before).unwrap_or(usize::MAX / 2));
         self.next = memory.next;
-        self.initial = memory.initial;
-        self.state.covariance = covariance;
-        self.state.attitude = Accumulator::from_parts(memory.attitude, memory.excess);
-        self.state.sum = memory.sum.map(|[x, y, z]| Triple::new(x, y, z));
-        if let (Some(world), Some(since)) = (&mut self.state.world, memory.world_since) {
-            world.count_from(since);
-        }
-        self.state.now = memory.now;
-        self.state.added = Status(memory.added);
-        self.state.reset_count = memory.resets;
-        self.state.rate = Vector3::from(memory.rates[0]);
-        self.last_rate = memory.rates[1];
-        self.last_stamp = memory.last;
+        self.output.state = memory.state;
+        self.output.attitude = memory.attitude;
+        self.output.covariance = covariance;
         let rows = |rows: &[Row]| -> VecDeque<Waiting> {
-            rows.iter().map(|row| waiting(memory.last, row)).collect()
+            rows.iter()
+                .map(|row| waiting(memory.state.last, row))
+                .collect()
         };
         self.queue = rows(&memory.waiting);
         if let Engine::Commit { open, .. } = &mut self.engine {
@@ -196,8 +164,8 @@ impl Propagator {
             _ => true,
         });
         memory.is_plausible()
-            && memory.sum.is_some() == self.state.sum.is_some()
-            && memory.world_since.is_some() == self.state.world.is_some()
+            && memory.state.sum.is_some() == self.output.state.sum.is_some()
+            && memory.state.world_since.is_some() == self.output.state.world_since.is_some()
             && elements.len() <= LOOKED_BACK + MOST_WAITING
             && (1..=elements.len()).contains(&memory.next)
             // Whoever has dropped some looks no further back than to what is there.

@@ -13,7 +13,6 @@ use crate::propagate::turn::Turn;
 use crate::propagate::window::{Note, Step};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::{AttitudeSample, RateSample, Status};
-use nalgebra::Vector3;
 use std::collections::VecDeque;
 
 /// A sample taken in and not yet output.
@@ -24,40 +23,86 @@ pub(super) struct Waiting {
     pub(super) turns: bool,
 }
 
-/// State of which the outputs are made.
-#[derive(Clone, Debug)]
+/// State of a propagator beside its samples, attitude and covariance: what is saved, as it is. A new field is added
+/// here alone, with `serde(default)`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct State {
-    pub(super) attitude: Accumulator,
-    /// Sum of rotation vectors, for the method that wants it.
-    pub(super) sum: Option<Triple<1>>,
-    /// World to which the accumulated attitude is relative, where the world turns: then it is q_ib.
-    pub(super) world: Option<TurningWorld>,
+    /// Attitude a reset goes to, w, x, y, z.
+    pub(super) initial: [f64; 4],
+    /// Sum of rotation vectors, rad, for the method that wants it.
+    pub(super) sum: Option<[f64; 3]>,
+    /// Instant at which the accumulated attitude, q_ib, was q_nb, ns; where the world turns.
+    pub(super) world_since: Option<i64>,
     /// Instant of the attitude accumulated, ns.
     pub(super) now: i64,
-    pub(super) covariance: Covariance,
-    pub(super) difference: Difference,
     /// Bits of the output being made that the propagator adds.
     pub(super) added: Status,
+    pub(super) resets: u32,
+    pub(super) rates: Rates,
+    /// Stamp of the last sample, ns.
+    pub(super) last: i64,
+}
+
+/// The last rates, rad/s.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "[[f64; 3]; 2]", into = "[[f64; 3]; 2]")
+)]
+pub(super) struct Rates {
+    /// Rate of the last output.
+    pub(super) output: [f64; 3],
+    /// Rate of the last sample.
+    pub(super) sample: [f64; 3],
+}
+
+impl From<[[f64; 3]; 2]> for Rates {
+    fn from([output, sample]: [[f64; 3]; 2]) -> Rates {
+        Rates { output, sample }
+    }
+}
+
+impl From<Rates> for [[f64; 3]; 2] {
+    fn from(rates: Rates) -> [[f64; 3]; 2] {
+        [rates.output, rates.sample]
+    }
+}
+
+/// Attitude, its covariance and what has been counted: of them the outputs are made.
+#[derive(Clone, Debug)]
+pub(super) struct Output {
+    pub(super) state: State,
+    pub(super) attitude: Accumulator,
+    /// World to which the accumulated attitude is relative, where the world turns.
+    world: Option<TurningWorld>,
+    pub(super) covariance: Covariance,
+    pub(super) difference: Difference,
     pub(super) report: Report,
-    pub(super) reset_count: u32,
-    pub(super) rate: Vector3<f64>,
     pub(super) integrated_nanos: i64,
 }
 
-impl State {
+impl Output {
     pub(super) fn new(settings: &Settings, initial: [f64; 4]) -> Self {
         let sum = (settings.method == Method::RotvecSum).then(|| rotation_vector(initial));
-        State {
+        let world = TurningWorld::new(settings.world_rate.as_vector());
+        Output {
+            state: State {
+                initial,
+                sum: sum.map(Into::into),
+                world_since: world.as_ref().map(|_| 0),
+                now: 0,
+                added: Status::OK,
+                resets: 0,
+                rates: Rates::default(),
+                last: 0,
+            },
             attitude: sum.map_or(Accumulator::new(initial), turned_by),
-            sum,
-            world: TurningWorld::new(settings.world_rate.as_vector()),
-            now: 0,
+            world,
             covariance: Covariance::new(settings.noise),
             difference: Difference::default(),
-            added: Status::OK,
             report: Report::default(),
-            reset_count: 0,
-            rate: Vector3::zeros(),
             integrated_nanos: 0,
         }
     }
@@ -65,31 +110,32 @@ impl State {
     /// A run begins at `stamp` with the attitude as it is: what lies between adds no rotation of the
     /// body relative to the world.
     pub(super) fn begin(&mut self, stamp: i64) {
-        if self.world.is_some() && self.now != stamp {
+        if self.world.is_some() && self.state.now != stamp {
             let q_nb = self.q_nb();
             self.attitude = Accumulator::new(q_nb);
-            if let Some(sum) = &mut self.sum {
-                *sum = rotation_vector(q_nb);
+            if let Some(sum) = &mut self.state.sum {
+                let mut phi = rotation_vector(q_nb);
                 // The same attitude on the other side of the sphere: a turn less about its axis.
-                let angle = sum.norm();
+                let angle = phi.norm();
                 if q_nb[0] < 0.0 && angle > 0.0 {
-                    *sum = *sum * ((angle - std::f64::consts::TAU) / angle);
+                    phi = phi * ((angle - std::f64::consts::TAU) / angle);
                 }
+                *sum = phi.into();
             }
         }
-        if let Some(world) = &mut self.world {
-            world.count_from(stamp);
-        }
-        self.now = stamp;
+        self.state.world_since = self.world.as_ref().map(|_| stamp);
+        self.state.now = stamp;
     }
 
     /// The attitude relative to the world, which may have turned.
     #[inline(always)]
     fn q_nb(&mut self) -> [f64; 4] {
         let accumulated = self.attitude.attitude();
-        match &self.world {
-            None => accumulated,
-            Some(world) => world.attitude(self.now, &accumulated),
+        match (&self.world, self.state.world_since) {
+            (Some(world), Some(since)) => {
+                world.attitude(self.state.now.saturating_sub(since), &accumulated)
+            }
+            _ => accumulated,
         }
     }
 
@@ -97,17 +143,18 @@ impl State {
     pub(super) fn resume(&mut self, last: &AttitudeSample) {
         self.reset(last.q_nb.wxyz());
         self.covariance.resume(last.covariance);
-        self.now = last.stamp.0;
-        self.reset_count = last.reset_count;
+        self.state.now = last.stamp.0;
+        self.state.resets = last.reset_count;
     }
 
     pub(super) fn reset(&mut self, initial: [f64; 4]) {
         self.attitude.restart(initial);
         self.covariance.restart();
         self.difference.restart();
-        if let Some(sum) = &mut self.sum {
-            *sum = rotation_vector(initial);
-            self.attitude = turned_by(*sum);
+        if let Some(sum) = &mut self.state.sum {
+            let phi = rotation_vector(initial);
+            *sum = phi.into();
+            self.attitude = turned_by(phi);
         }
     }
 
@@ -115,24 +162,25 @@ impl State {
     #[inline(always)]
     pub(super) fn step(&mut self, step: &Step, track: &Track, k: usize) {
         let mut turn = step.turn;
-        match &mut self.sum {
+        match &mut self.state.sum {
             None => self.attitude.turn(turn),
             Some(sum) => {
                 let [_, x, y, z] = turn;
                 let phi = Triple::new(x, y, z);
-                *sum = *sum + phi;
-                self.attitude = turned_by(*sum);
+                let whole = Triple::from(*sum) + phi;
+                *sum = whole.into();
+                self.attitude = turned_by(whole);
                 turn = Turn::exp(phi).parts();
             }
         }
-        self.now = track.stamp[k];
+        self.state.now = track.stamp[k];
         self.difference.add(&self.attitude, step.outer);
         let spacing = track.spacing(k);
         self.covariance.advance(turn, secs(spacing));
         self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
         self.report.angle_turned += step.angle;
         self.report.largest_step = self.report.largest_step.max(step.angle);
-        self.added = self.added.with(step.status());
+        self.state.added = self.state.added.with(step.status());
         if step.angle > std::f64::consts::PI {
             self.report.undersampled += 1;
         }
@@ -187,20 +235,20 @@ impl State {
         out: &mut Vec<AttitudeSample>,
     ) {
         if let Some(rate) = rate {
-            self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
+            self.state.rates.output = rate.into();
         }
         let q_nb = self.q_nb();
         out.push(AttitudeSample {
             stamp: sample.stamp,
             q_nb: Quaternion::assume_unit(q_nb),
-            rate: BodyRate(self.rate),
+            rate: BodyRate(self.state.rates.output.into()),
             accel: sample.accel,
             covariance: self.covariance.attitude(),
-            status: sample.status.with(self.added),
-            reset_count: self.reset_count,
+            status: sample.status.with(self.state.added),
+            reset_count: self.state.resets,
             log: sample.log,
         });
-        self.added = Status::OK;
+        self.state.added = Status::OK;
         self.report.samples += 1;
     }
 }

@@ -19,8 +19,6 @@ pub(super) struct TurningWorld {
     /// rad/s
     speed: f64,
     axis: Vector3<f64>,
-    /// t0: when q_ib was q_nb, ns.
-    since: i64,
 }
 
 impl TurningWorld {
@@ -30,14 +28,13 @@ impl TurningWorld {
         (speed > 0.0).then(|| TurningWorld {
             speed,
             axis: w_in_n / speed,
-            since: 0,
         })
     }
 
-    /// The attitude at `stamp` of a body whose q_ib is given. Continuous in time, sign included.
-    pub(super) fn attitude(&self, stamp: i64, q_ib: &[f64; 4]) -> [f64; 4] {
+    /// The attitude of a body whose q_ib is given, `nanos` after t0. Continuous in time, sign included.
+    pub(super) fn attitude(&self, nanos: i64, q_ib: &[f64; 4]) -> [f64; 4] {
         // Integers first, so that a run of a day keeps its nanoseconds.
-        let half = 0.5 * self.speed * secs(stamp.saturating_sub(self.since));
+        let half = 0.5 * self.speed * secs(nanos);
         let (sin, cos) = half.sin_cos();
         let turned = [
             cos,
@@ -46,15 +43,5 @@ impl TurningWorld {
             -sin * self.axis.z,
         ];
         quat::normalised(&quat::product(&turned, q_ib))
-    }
-
-    /// The instant [`count_from`](Self::count_from) was told last.
-    pub(super) fn since(&self) -> i64 {
-        self.since
-    }
-
-    /// Counts the accumulated attitude from `stamp` on, where it is q_nb itself.
-    pub(super) fn count_from(&mut self, stamp: i64) {
-        self.since = stamp;
     }
 }
