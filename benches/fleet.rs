@@ -8,10 +8,9 @@
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
-use strapd::serve::Settings;
-use strapd::serve::hub::Hub;
-use strapd::serve::limits::Limits;
-use strapd::serve::session::{Scratch, Session};
+use strapd::serve::core::hub::{Hub, Settings};
+use strapd::serve::core::session::{Scratch, Session};
+use strapd::serve::guard::limits::Limits;
 use strapd_attitude::estimate::{Aid, Plan};
 use strapd_attitude::record::Nanos;
 

@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
-use strapd::serve::hub::Hub;
-use strapd::serve::session::{Scratch, Session};
+use strapd::serve::core::hub::Hub;
+use strapd::serve::core::session::{Scratch, Session};
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::decode::packed::{self, Object};
@@ -319,7 +319,7 @@ fn packed_object(object: &[u8]) {
 /// A whole conversation with the daemon, watched as lines or (by the first byte) packed: what it answers is JSON, a
 /// line each, or whole packed attitudes that were named before, and every attitude is finite.
 pub fn session(data: &[u8]) {
-    let settings = strapd::serve::Settings::default();
+    let settings = strapd::serve::core::hub::Settings::default();
     let Ok(hub) = Hub::new(settings) else {
         panic!("the default settings are in order");
     };
@@ -420,8 +420,8 @@ fn answer(line: &[u8], named: &mut BTreeSet<u64>) {
 /// Parses what a viewer sends: text and binary messages of Foxglove's protocol.
 pub fn foxglove(data: &[u8]) {
     for asked in [
-        strapd::serve::foxglove::read_text(data),
-        strapd::serve::foxglove::read_binary(data),
+        strapd::serve::protocol::foxglove::read_text(data),
+        strapd::serve::protocol::foxglove::read_binary(data),
     ] {
         if let Err(why) = asked {
             assert!(!why.is_empty());

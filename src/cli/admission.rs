@@ -2,8 +2,9 @@
 
 use crate::error::Result;
 use crate::serve::Settings;
-use crate::serve::admission::{Token, Web};
-use crate::serve::limits::Limits;
+use crate::serve::core::hub;
+use crate::serve::guard::admission::{Token, Web};
+use crate::serve::guard::limits::Limits;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -39,13 +40,16 @@ impl Admission {
     /// The token file cannot be read, or holds none.
     pub(super) fn apply(&self, settings: Settings) -> Result<Settings> {
         Ok(Settings {
-            token: self.token_file.as_deref().map(Token::read).transpose()?,
+            hub: hub::Settings {
+                token: self.token_file.as_deref().map(Token::read).transpose()?,
+                limits: settings.hub.limits.of_clients(self.max_clients),
+                ..settings.hub
+            },
             allow_insecure_remote: self.allow_insecure_remote,
             web: Web {
                 hosts: self.allow_host.clone(),
                 origins: self.allow_origin.clone(),
             },
-            limits: settings.limits.of_clients(self.max_clients),
             ..settings
         })
     }

@@ -320,6 +320,7 @@ impl Layered {
                 Error::usage(Diagnostic::from(&why).at(format_args!("sensor {id}")))
             })?;
             settings
+                .hub
                 .plans
                 .insert(id.clone(), each.remove(id).unwrap_or(plan));
         }

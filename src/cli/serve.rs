@@ -8,13 +8,15 @@ use super::{Global, Outcome};
 use crate::address::Address;
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
-use crate::serve::hub::Hub;
-use crate::serve::limits::Limits;
-use crate::serve::recorder::{self, Recorder, Split};
-use crate::serve::shutdown::Signals;
-use crate::serve::source::{Endpoint, means_nats, means_zenoh};
-use crate::serve::state::StateFile;
-use crate::serve::{Server, Settings, listen};
+use crate::serve::core::hub::{self, Hub};
+use crate::serve::core::recorder::{self, Recorder, Split};
+use crate::serve::core::state::StateFile;
+use crate::serve::edge::listen;
+use crate::serve::edge::output::Output;
+use crate::serve::edge::source::Endpoint;
+use crate::serve::guard::limits::Limits;
+use crate::serve::guard::shutdown::Signals;
+use crate::serve::{Server, Settings};
 use crate::sink::address::{DEFAULTS, Listen};
 use crate::sink::{Format, Target};
 use clap::Args;
@@ -128,29 +130,6 @@ fn window(text: &str) -> std::result::Result<Duration, String> {
         .ok_or_else(|| "expected seconds, 0 to 86400".to_owned())
 }
 
-/// A sink of the daemon.
-fn sent_to(text: &str) -> Result<Target> {
-    #[cfg(not(feature = "nats"))]
-    if means_nats(text) {
-        return Err(crate::serve::source::without_nats("-o", text));
-    }
-    #[cfg(not(feature = "zenoh"))]
-    if means_zenoh(text) {
-        return Err(crate::serve::source::without_zenoh("-o", text));
-    }
-    match Target::parse(text)? {
-        target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(target),
-        _ => Err(Error::usage(
-            Diagnostic::new(format!(
-                "-o {text}: the daemon sends to tcp://HOST:PORT and udp://HOST:PORT[?profile=plotjuggler]"
-            ))
-            .help(
-                "--listen waits for watchers, --record FILE.mcap writes a file",
-            )
-        )),
-    }
-}
-
 /// Runs it until a signal.
 ///
 /// # Errors
@@ -178,14 +157,14 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     let state = match &args.state {
         Some(path) => {
             let (file, saved) = StateFile::open(path)?;
-            settings.saved = saved;
+            settings.hub.saved = saved;
             Some(Arc::new(Mutex::new(file)))
         }
         None => None,
     };
     // After the state, which may be another daemon's: a recording that is replaced is gone.
     let recorder = recording.map(Recorder::start).transpose()?;
-    settings.recorder = recorder.as_ref().map(Recorder::handle);
+    settings.hub.recorder = recorder.as_ref().map(Recorder::handle);
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);
@@ -418,42 +397,29 @@ impl Serve {
         };
         let (plan, plans) = self.estimation.live_plans()?;
         self.admission.apply(Settings {
-            decode: self.estimation.selection()?.decode,
-            plan,
-            plans,
+            hub: hub::Settings {
+                decode: self.estimation.selection()?.decode,
+                plan,
+                plans,
+                limits: Limits {
+                    state_window: self.state_window,
+                    forget_after: self.forget_after,
+                    ..Limits::of_sensors(self.max_sensors)
+                },
+                ..hub::Settings::default()
+            },
             listen: given
                 .into_iter()
                 .map(Listen::parse)
                 .collect::<Result<_>>()?,
             sources: self.outgoing()?,
-            #[cfg(unix)]
-            passed: listen::Passed::from_env(),
             outputs: self
                 .output
                 .iter()
-                .filter(|o| !(cfg!(feature = "nats") && means_nats(o)))
-                .filter(|o| !(cfg!(feature = "zenoh") && means_zenoh(o)))
-                .map(|o| sent_to(o))
+                .map(|o| Output::parse(o))
                 .collect::<Result<_>>()?,
-            #[cfg(feature = "nats")]
-            nats: self
-                .output
-                .iter()
-                .filter(|o| means_nats(o))
-                .map(|o| crate::serve::nats::address::NatsAddress::output(o))
-                .collect::<Result<_>>()?,
-            #[cfg(feature = "zenoh")]
-            zenoh: self
-                .output
-                .iter()
-                .filter(|o| means_zenoh(o))
-                .map(|o| crate::serve::zenoh::address::ZenohAddress::output(o))
-                .collect::<Result<_>>()?,
-            limits: Limits {
-                state_window: self.state_window,
-                forget_after: self.forget_after,
-                ..Limits::of_sensors(self.max_sensors)
-            },
+            #[cfg(unix)]
+            passed: listen::Passed::from_env(),
             ..Settings::default()
         })
     }

@@ -5,6 +5,7 @@ use super::{Outcome, replay};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::Audience;
 use crate::serve::Settings;
+use crate::serve::core::hub;
 use crate::serve::playback::controls::Playback;
 use crate::serve::playback::server::{Cast, Next};
 use crate::sink::Target;
@@ -115,8 +116,11 @@ impl Serving {
                 None
             });
             let settings = self.admission.apply(Settings {
+                hub: hub::Settings {
+                    brings_samples,
+                    ..hub::Settings::default()
+                },
                 listen,
-                brings_samples,
                 ..Settings::default()
             })?;
             let cast = Cast::start(settings, playback, self.page.is_some(), true)?;

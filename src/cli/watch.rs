@@ -17,7 +17,7 @@ use crate::client::remote::Remote;
 use crate::client::secret::Secret;
 use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
-use crate::serve::shutdown::Signals;
+use crate::serve::guard::shutdown::Signals;
 use board::Board;
 use clap::Args;
 use screen::{Key, Screen};

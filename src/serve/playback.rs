@@ -2,5 +2,4 @@
 
 pub mod controls;
 mod estimated;
-pub mod position;
 pub mod server;

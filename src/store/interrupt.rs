@@ -4,7 +4,7 @@
 //! here; where none is under way they do what they always do: end the process, or what somebody else who listens (a page that is
 //! served) makes of them.
 
-use crate::serve::shutdown::Signals;
+use crate::serve::guard::shutdown::Signals;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tokio::sync::watch;

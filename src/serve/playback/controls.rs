@@ -4,9 +4,9 @@
 //! for changes from the tasks that serve them. A seek changes no bit of any attitude: forward, the run
 //! integrates on without showing; backward, it is begun again and does not show until it is there.
 
-use super::position::{Action, Mode, Position, Timeline};
 use crate::pipeline::pace::Pace;
-use crate::serve::fault::Fault;
+use crate::serve::guard::fault::Fault;
+use crate::serve::protocol::position::{Action, Mode, Position, Timeline};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;

@@ -2,9 +2,9 @@
 //!
 //! A page of a simulation without an estimate would show the truth beside nothing.
 
-use crate::serve::channel::{Channel, Items};
-use crate::serve::hub::Hub;
-use crate::serve::stream::{SensorStream, live_plan};
+use crate::serve::core::channel::{Channel, Items};
+use crate::serve::core::hub::Hub;
+use crate::serve::core::stream::{SensorStream, live_plan};
 use std::sync::Arc;
 use strapd_attitude::estimate::{Aid, Plan};
 use strapd_attitude::record::{RawSample, SampleKind};

@@ -8,11 +8,11 @@ use super::controls::{Grant, Notice, Playback};
 use super::estimated::Estimated;
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
-use crate::serve::channel::health::Health;
-use crate::serve::channel::{Channel, Items};
-use crate::serve::hub::{Flood, Hub};
-use crate::serve::shutdown::Signals;
-use crate::serve::{Server, Settings};
+use crate::serve::core::channel::health::Health;
+use crate::serve::core::channel::{Channel, Items};
+use crate::serve::core::hub::{Flood, Hub};
+use crate::serve::daemon::{Server, Settings};
+use crate::serve::guard::shutdown::Signals;
 use crate::sink::address::Listen;
 use crate::sink::{Content, Stream};
 use std::collections::BTreeMap;
@@ -95,7 +95,7 @@ impl Cast {
         signals: bool,
     ) -> Result<Cast> {
         let playback = Arc::new(playback);
-        settings.timeline = Some(playback.clone());
+        settings.hub.timeline = Some(playback.clone());
         let failed = |e: std::io::Error| Error::usage(format!("cannot serve: {e}"));
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)

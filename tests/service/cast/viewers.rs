@@ -199,7 +199,7 @@ fn imu(cdr: &[u8]) -> ([f64; 9], [f64; 4]) {
 #[test]
 fn an_aided_sensors_messages_have_the_filters_covariance_about_the_axes_of_the_world() {
     let mut settings = listening(&[TCP, WS]);
-    settings.plan.aid = strapd_attitude::estimate::Aid::Gravity;
+    settings.hub.plan.aid = strapd_attitude::estimate::Aid::Gravity;
     let daemon = Daemon::start(settings);
     let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
     // On its side, and turning about the vertical: which of its axes is which of the world's shows.
@@ -311,7 +311,9 @@ fn a_new_subscription_gets_the_last_message_of_its_channel_at_once() {
 #[test]
 fn a_token_is_asked_for_before_anything_is_said() {
     let mut settings = listening(&[WS]);
-    settings.token = Some(strapd::serve::admission::Token::new("0123456789abcdef"));
+    settings.hub.token = Some(strapd::serve::guard::admission::Token::new(
+        "0123456789abcdef",
+    ));
     let daemon = Daemon::start(settings);
     let stream = TcpStream::connect(daemon.address(0)).unwrap();
     let mut request = format!("ws://{}/", daemon.address(0))

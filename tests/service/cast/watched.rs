@@ -7,10 +7,9 @@ use crate::serve::daemon::{Process, TCP, WS, eventually};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
-use strapd::serve::Settings;
-use strapd::serve::hub::Hub;
+use strapd::serve::core::hub::{Hub, Settings};
+use strapd::serve::core::session::{Scratch, Session};
 use strapd::serve::playback::controls::Playback;
-use strapd::serve::session::{Scratch, Session};
 use strapd_attitude::record::Nanos;
 
 /// Started, and waiting for a client to say `play`.

@@ -5,7 +5,7 @@ use crate::serve::client::get;
 use crate::serve::daemon::{Daemon, TCP, WS, listening};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
-use strapd::serve::admission::Token;
+use strapd::serve::guard::admission::Token;
 
 const SECRET: &str = "correct horse battery";
 
@@ -119,7 +119,7 @@ fn a_page_of_another_origin_writes_no_sample() {
 fn the_page_asks_for_the_token_and_goes_on_with_it() {
     let mut browser = Browser::start();
     let mut settings = listening(&[WS]);
-    settings.token = Some(Token::new(SECRET));
+    settings.hub.token = Some(Token::new(SECRET));
     let daemon = Daemon::start(settings);
     browser.go(daemon.address(0), "/");
     browser.until(
@@ -195,7 +195,7 @@ fn an_ordinary_request_gets_the_page_and_tops_within_bounds() {
     assert_eq!(found["truth"]["q"].as_array().unwrap().len(), 50);
 
     let mut settings = listening(&[WS]);
-    settings.token = Some(Token::new(SECRET));
+    settings.hub.token = Some(Token::new(SECRET));
     let guarded = Daemon::start(settings);
     let address = guarded.address(0);
     let host = address.to_string();

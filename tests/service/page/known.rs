@@ -6,19 +6,17 @@ use crate::serve::aiding::{aided, line, roll};
 use crate::serve::client::Client;
 use crate::serve::daemon::{Daemon, TCP, WS, eventually, listening};
 use serde_json::{Value, json};
-use strapd::serve::Settings;
-use strapd::serve::admission::Token;
+use strapd::serve::guard::admission::Token;
 use strapd_attitude::estimate::Plan;
 
 const SECRET: &str = "correct horse battery";
 
 /// A daemon, and who has sent it 20 s of a body that rolls; its token was shown where there is one.
 fn rolling(token: Option<&str>, plan: Plan) -> (Daemon, Client) {
-    let daemon = Daemon::start(Settings {
-        plan,
-        token: token.map(Token::new),
-        ..listening(&[TCP, WS])
-    });
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.plan = plan;
+    settings.hub.token = token.map(Token::new);
+    let daemon = Daemon::start(settings);
     let mut sender = Client::tcp(daemon.address(0));
     if let Some(token) = token {
         sender.send(&format!("{{\"class\":\"AUTH\",\"token\":\"{token}\"}}"));

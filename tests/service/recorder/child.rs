@@ -7,7 +7,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use strapd::serve::recorder::{Recorder, Settings};
+use strapd::serve::core::recorder::{Recorder, Settings};
 
 const TASK: &str = "STRAPD_RECORDER_CHILD";
 

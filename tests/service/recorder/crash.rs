@@ -7,7 +7,7 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use strapd::serve::recorder::{Recorder, Settings};
+use strapd::serve::core::recorder::{Recorder, Settings};
 
 /// Kills `children` recording processes, each at its own moment, `at_once` at a time. The samples each
 /// one had handed over that are not in its file, in seconds, sorted.

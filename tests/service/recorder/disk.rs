@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::Arc;
 use strapd::error::Error;
-use strapd::serve::recorder::{Recorder, Settings};
+use strapd::serve::core::recorder::{Recorder, Settings};
 
 /// The recording child, started by a shell that first narrows what it may write; `SELF` stands for it.
 fn starved(script: &str, task: Task, path: &Path, counter: &Path) -> Output {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use strapd::pipeline::logged;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::request::ReplayRequest;
-use strapd::serve::recorder::{Recorder, Settings};
+use strapd::serve::core::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
 use strapd_attitude::record::RawSample;
@@ -130,7 +130,7 @@ fn a_chunk_every_two_hundred_milliseconds_costs_a_few_hundred_bytes_each() {
         let provenance = Default::default();
         let mut live = strapd::sink::LiveMcap::new(compression, &provenance).unwrap();
         let stream = live
-            .stream(&strapd::serve::recorder::stream_of("imu"))
+            .stream(&strapd::serve::core::recorder::stream_of("imu"))
             .unwrap();
         let mut bytes = 0;
         for k in 0..60 * rate_hz {

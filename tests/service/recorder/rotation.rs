@@ -3,7 +3,7 @@
 use super::{assert_whole, sample};
 use std::sync::Arc;
 use std::time::Duration;
-use strapd::serve::recorder::{Recorder, Settings, Split, stream_of};
+use strapd::serve::core::recorder::{Recorder, Settings, Split, stream_of};
 
 #[test]
 fn a_recording_split_by_size_loses_nothing_between_its_files_and_overwrites_none() {

@@ -6,7 +6,7 @@ use std::io::{BufRead, Read};
 use std::net::IpAddr;
 use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
-use strapd::serve::admission::{Token, Web};
+use strapd::serve::guard::admission::{Token, Web};
 
 const SECRET: &str = "correct horse battery";
 
@@ -155,7 +155,7 @@ fn a_page_from_elsewhere_gets_neither_numbers_nor_a_web_socket() {
 
 fn guarded() -> Daemon {
     let mut settings = listening(&[TCP, WS, UDP]);
-    settings.token = Some(Token::new(SECRET));
+    settings.hub.token = Some(Token::new(SECRET));
     Daemon::start(settings)
 }
 
@@ -337,7 +337,7 @@ fn an_address_others_can_reach_needs_a_token() {
         ("udp-listen://0.0.0.0:0", false),
     ] {
         let mut settings = listening(&[uri]);
-        settings.token = Some(Token::new(SECRET));
+        settings.hub.token = Some(Token::new(SECRET));
         let bound = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()

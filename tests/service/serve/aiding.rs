@@ -5,7 +5,6 @@ use super::client::Client;
 use super::daemon::{Daemon, TCP, listening};
 use super::runs::Fed;
 use serde_json::Value;
-use strapd::serve::Settings;
 use strapd_attitude::estimate::{Aid, Plan};
 
 /// A body that rolls slowly to and fro about 0.3 rad at 100 Hz, its gyro off by 0.5 deg/s.
@@ -31,10 +30,9 @@ pub(crate) fn aided() -> Plan {
 
 #[test]
 fn a_daemon_gives_the_bytes_of_a_replay_and_says_what_it_learned() {
-    let daemon = Daemon::start(Settings {
-        plan: aided(),
-        ..listening(&[TCP])
-    });
+    let mut settings = listening(&[TCP]);
+    settings.hub.plan = aided();
+    let daemon = Daemon::start(settings);
     let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
     let mut sender = Client::tcp(daemon.address(0));
     let lines: Vec<String> = (0..2000).map(line).collect();

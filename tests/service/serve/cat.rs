@@ -249,7 +249,9 @@ fn a_token_is_shown_and_its_lack_is_told() {
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
     let file = path.to_str().unwrap();
     let mut settings = listening(&[TCP, WS]);
-    settings.token = Some(strapd::serve::admission::Token::new("0123456789abcdef"));
+    settings.hub.token = Some(strapd::serve::guard::admission::Token::new(
+        "0123456789abcdef",
+    ));
     let daemon = Daemon::start(settings);
     for (n, scheme) in ["tcp", "ws"].into_iter().enumerate() {
         let url = format!("{scheme}://{}", daemon.address(n));

@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::Command;
 use std::sync::mpsc::{Receiver, channel};
-use strapd::serve::source::Endpoint;
+use strapd::serve::edge::source::Endpoint;
 use tungstenite::Message;
 use tungstenite::handshake::server::{Request, Response};
 
@@ -114,8 +114,8 @@ fn a_peer_that_says_nothing_stays_connected_beyond_every_limit_on_clients() {
     let (listener, address) = listen();
     let mut settings = listening(&[TCP]);
     settings.sources = vec![Endpoint::parse(&format!("tcp://{address}")).unwrap()];
-    settings.limits.first_line = std::time::Duration::from_millis(20);
-    settings.limits.no_progress = std::time::Duration::from_millis(20);
+    settings.hub.limits.first_line = std::time::Duration::from_millis(20);
+    settings.hub.limits.no_progress = std::time::Duration::from_millis(20);
     let daemon = Daemon::start(settings);
     let mut sender = accept(&listener);
     // A client would have been closed by now, as this one is.
@@ -322,7 +322,9 @@ fn a_token_is_shown_to_a_daemon_that_asks_for_one() {
     std::fs::write(&path, "0123456789abcdef\n").unwrap();
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
     let mut settings = listening(&[TCP, WS]);
-    settings.token = Some(strapd::serve::admission::Token::new("0123456789abcdef"));
+    settings.hub.token = Some(strapd::serve::guard::admission::Token::new(
+        "0123456789abcdef",
+    ));
     let first = Daemon::start(settings);
     for uri in [
         format!("tcp://{}", first.address(0)),

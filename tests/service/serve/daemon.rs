@@ -7,7 +7,7 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use strapd::serve::hub::Hub;
+use strapd::serve::core::hub::Hub;
 use strapd::serve::{Server, Settings};
 use strapd::sink::address::Listen;
 

@@ -222,7 +222,9 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
 
 #[test]
 fn the_page_shows_the_heartbeat_that_is_sent() {
-    let sent = strapd::serve::wire::heartbeat(strapd::serve::limits::Limits::default().ping);
+    let sent = strapd::serve::protocol::wire::heartbeat(
+        strapd::serve::guard::limits::Limits::default().ping,
+    );
     assert!(
         PAGE.contains(std::str::from_utf8(&sent).unwrap()),
         "{sent:?}"

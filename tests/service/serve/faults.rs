@@ -6,9 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use strapd::serve::Settings;
-use strapd::serve::hub::Hub;
-use strapd::serve::session::{Scratch, Session};
+use strapd::serve::core::hub::{Hub, Settings};
+use strapd::serve::core::session::{Scratch, Session};
 use strapd_attitude::record::Nanos;
 
 /// A conversation without a socket: lines with the time each is received at -> what a watcher gets.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
-use strapd::serve::source::Endpoint;
+use strapd::serve::edge::source::Endpoint;
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
 

@@ -10,7 +10,7 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use strapd::serve::limits::Limits;
+use strapd::serve::guard::limits::Limits;
 
 const WATCH: &str = "{\"class\":\"WATCH\"}";
 const FROM_NOW: &str = "{\"class\":\"WATCH\",\"last\":false}";
@@ -21,7 +21,7 @@ const NOTICED: Duration = Duration::from_secs(30);
 fn curious(path: &Path) -> Daemon {
     let unix = format!("unix-listen://{}", path.display());
     let mut settings = listening(&[TCP, WS, &unix]);
-    settings.limits.ping = Duration::from_millis(400);
+    settings.hub.limits.ping = Duration::from_millis(400);
     Daemon::start(settings)
 }
 
@@ -208,7 +208,7 @@ fn what_waits_for_the_unit_of_its_stamps_is_used_when_its_sender_ends_its_side()
 fn the_truth_and_the_share_of_a_sender_that_has_ended_its_side_are_given_back() {
     let mut settings = listening(&[TCP]);
     // One peer may send three of six sensors.
-    settings.limits = Limits {
+    settings.hub.limits = Limits {
         sensors: 6,
         sensors_of_client: 2,
         ..Limits::default()
@@ -238,7 +238,7 @@ fn the_truth_and_the_share_of_a_sender_that_has_ended_its_side_are_given_back() 
 #[test]
 fn who_has_ended_its_side_gives_way_first_the_one_silent_longest_before_the_others() {
     let mut settings = listening(&[TCP]);
-    settings.limits = Limits {
+    settings.hub.limits = Limits {
         connections: 4,
         ..Limits::default()
     };

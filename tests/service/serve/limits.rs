@@ -5,11 +5,11 @@ use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening};
 use std::io::Write;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
-use strapd::serve::limits::Limits;
+use strapd::serve::guard::limits::Limits;
 
 fn with(limits: Limits) -> Daemon {
     let mut settings = listening(&[TCP, WS]);
-    settings.limits = limits;
+    settings.hub.limits = limits;
     Daemon::start(settings)
 }
 

@@ -112,7 +112,7 @@ fn the_first_byte_decides_wherever_it_comes_and_at_once() {
 #[test]
 fn who_must_show_a_token_hears_of_both() {
     let mut settings = listening(&[TCP]);
-    settings.token = Some(strapd::serve::admission::Token::new(
+    settings.hub.token = Some(strapd::serve::guard::admission::Token::new(
         "correct horse battery",
     ));
     let daemon = Daemon::start(settings);

@@ -46,7 +46,7 @@ fn what_a_live_stream_can_not_do_is_refused_before_anything_is_bound() {
 fn what_has_arrived_before_the_end_reaches_whoever_watches() {
     let mut settings = listening(&[TCP, WS]);
     // Two seconds are the promise; how busy this machine is is not part of it.
-    settings.limits.drain = PATIENCE;
+    settings.hub.limits.drain = PATIENCE;
     let daemon = Daemon::start(settings);
     let mut watchers = [
         Client::tcp(daemon.address(0)),

@@ -9,11 +9,10 @@ use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::process::Command;
 use std::sync::Arc;
-use strapd::serve::Settings;
-use strapd::serve::admission::Token;
-use strapd::serve::hub::Hub;
-use strapd::serve::limits::Limits;
-use strapd::serve::session::{Scratch, Session};
+use strapd::serve::core::hub::{Hub, Settings};
+use strapd::serve::core::session::{Scratch, Session};
+use strapd::serve::guard::admission::Token;
+use strapd::serve::guard::limits::Limits;
 use strapd_attitude::record::{Nanos, Status};
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
@@ -508,7 +507,7 @@ fn more_packed_streams_at_once_than_replies_may_wait_are_all_named() {
 #[test]
 fn a_fleet_comes_through_one_connection_up_to_a_quarter_of_all_places() {
     let mut settings = listening(&[TCP]);
-    settings.limits = Limits::of_sensors(8000);
+    settings.hub.limits = Limits::of_sensors(8000);
     let daemon = Daemon::start(settings);
     let mut gateway = Client::tcp(daemon.address(0));
     gateway.object("VERSION");
@@ -536,7 +535,7 @@ fn a_fleet_comes_through_one_connection_up_to_a_quarter_of_all_places() {
 #[test]
 fn where_a_token_is_asked_for_a_packed_object_is_no_way_in() {
     let mut settings = listening(&[TCP]);
-    settings.token = Some(Token::new("0123456789abcdef"));
+    settings.hub.token = Some(Token::new("0123456789abcdef"));
     let daemon = Daemon::start(settings);
     for first in [Sample::lively(0).packed(1), bind(1, "a").into_bytes()] {
         let mut client = Client::tcp(daemon.address(0));

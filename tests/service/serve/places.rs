@@ -4,13 +4,13 @@ use super::client::{Client, ask, rate};
 use super::daemon::{Daemon, Process, TCP, WS, eventually, listening};
 use serde_json::Value;
 use std::time::Duration;
-use strapd::serve::limits::Limits;
-use strapd::serve::session::{Scratch, Session, Side};
+use strapd::serve::core::session::{Scratch, Session, Side};
+use strapd::serve::guard::limits::Limits;
 use strapd_attitude::record::Nanos;
 
 fn with_places(sensors: usize) -> Daemon {
     let mut settings = listening(&[TCP]);
-    settings.limits = Limits {
+    settings.hub.limits = Limits {
         sensors,
         ..Limits::default()
     };
@@ -136,7 +136,7 @@ fn one_connection_sends_256_sensors_and_one_peer_512_and_others_have_the_rest() 
 #[test]
 fn a_sensor_that_a_broker_brings_no_more_is_nobodys_after_a_while() {
     let mut settings = listening(&[TCP]);
-    settings.limits = Limits {
+    settings.hub.limits = Limits {
         sensors: 2,
         sender_silence: Duration::from_secs(2),
         ..Limits::default()
@@ -200,7 +200,7 @@ fn a_sensor_that_was_silent_for_long_goes_on_as_if_nothing_had_happened() {
     // The same samples to one that forgets and one that does not.
     let [forgetful, patient] = [Some(Duration::from_millis(500)), None].map(|forget_after| {
         let mut settings = listening(&[TCP, WS]);
-        settings.limits.forget_after = forget_after;
+        settings.hub.limits.forget_after = forget_after;
         let daemon = Daemon::start(settings);
         let watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
         let sender = Client::tcp(daemon.address(0));

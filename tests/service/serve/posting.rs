@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
-use strapd::serve::admission::Token;
+use strapd::serve::guard::admission::Token;
 
 const JSON: (&str, &str) = ("Content-Type", "application/json");
 const LINES: (&str, &str) = ("Content-Type", "application/x-ndjson");
@@ -300,7 +300,7 @@ fn nothing_a_page_can_send_is_taken() {
 #[test]
 fn with_a_token_only_who_shows_it_posts() {
     let mut settings = listening(&[WS]);
-    settings.token = Some(Token::new("correct horse battery"));
+    settings.hub.token = Some(Token::new("correct horse battery"));
     let daemon = Daemon::start(settings);
     let body = rate("a", 0, 1.0);
     let with = |shown: &'static str| [JSON, ("Authorization", shown)];
@@ -343,7 +343,7 @@ fn a_body_of_more_than_a_mebibyte_is_refused_by_what_it_says_and_by_what_comes()
 #[test]
 fn a_body_that_stops_coming_is_given_up() {
     let mut settings = listening(&[WS]);
-    settings.limits.no_progress = Duration::from_millis(300);
+    settings.hub.limits.no_progress = Duration::from_millis(300);
     let daemon = Daemon::start(settings);
     let mut stream = TcpStream::connect(daemon.address(0)).unwrap();
     let head = "POST /samples HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{";
@@ -356,7 +356,7 @@ fn a_body_that_stops_coming_is_given_up() {
 #[test]
 fn a_posted_sensor_is_its_posters_for_a_while() {
     let mut settings = listening(&[TCP, WS]);
-    settings.limits.sender_silence = Duration::from_secs(2);
+    settings.hub.limits.sender_silence = Duration::from_secs(2);
     let daemon = Daemon::start(settings);
     assert_eq!(post(&daemon, 1, &[JSON], &rate("a", 0, 1.0)).0, 200);
     let mut other = Client::tcp(daemon.address(0));

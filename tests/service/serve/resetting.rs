@@ -7,8 +7,8 @@ use super::daemon::{Daemon, Process, TCP, WS, eventually, listening};
 use super::runs::{Fed, as_first};
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpStream};
-use strapd::serve::Settings;
-use strapd::serve::admission::Token;
+use strapd::serve::core::hub::{Hub, Settings};
+use strapd::serve::guard::admission::Token;
 use strapd_attitude::estimate::{Bias, Initial, Plan};
 use strapd_attitude::quaternion::Quaternion;
 use tungstenite::client::IntoClientRequest;
@@ -269,7 +269,7 @@ fn of_pages_the_daemons_own_may_reset_and_with_a_token_only_once_it_was_shown() 
     const FRIEND: &str = "https://friend.example";
     for token in [None, Some(SECRET)] {
         let mut settings = listening(&[TCP, WS]);
-        settings.token = token.map(Token::new);
+        settings.hub.token = token.map(Token::new);
         settings.web.origins.push(FRIEND.to_owned());
         let daemon = Daemon::start(settings);
         let address = daemon.address(1);
@@ -466,7 +466,7 @@ fn gravity_and_bias_begin_what_a_daemon_learns_and_are_refused_of_a_gyro_alone()
             ..Plan::default()
         },
     ] {
-        let why = strapd::serve::hub::Hub::new(Settings {
+        let why = Hub::new(Settings {
             plan: plan.clone(),
             ..Settings::default()
         });

@@ -8,10 +8,9 @@ use super::daemon::{Daemon, eventually};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use strapd::serve::Settings;
-use strapd::serve::hub::Hub;
-use strapd::serve::session::{Scratch, Session};
-use strapd::serve::state::{Saved, Sensors};
+use strapd::serve::core::hub::{Hub, Settings};
+use strapd::serve::core::session::{Scratch, Session};
+use strapd::serve::core::state::{Saved, Sensors};
 use strapd_attitude::estimate::Memory;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{Nanos, SampleKind};
@@ -350,7 +349,7 @@ fn a_file_of_the_release_before_is_read() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("state.json");
     std::fs::write(&path, file).unwrap();
-    let (_, saved) = strapd::serve::state::StateFile::open(&path).unwrap();
+    let (_, saved) = strapd::serve::core::state::StateFile::open(&path).unwrap();
     let mut daemon = Fed::new(Settings {
         saved,
         ..Settings::default()

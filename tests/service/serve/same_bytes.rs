@@ -84,7 +84,7 @@ fn check(log: &Path) {
     ] {
         // A sensor goes on where it stopped: each way gets a daemon of its own.
         let mut settings = listening(&[TCP, UDP, WS, &unix]);
-        settings.plan.aid = Aid::Auto;
+        settings.hub.plan.aid = Aid::Auto;
         let daemon = Daemon::start(settings);
         let watcher = if way == "tcp" {
             Client::web(daemon.address(2))
@@ -135,8 +135,8 @@ fn printed(args: &[&str], input: &[u8]) -> Option<Vec<u8>> {
 /// The attitudes a daemon that takes samples for this kind makes of these lines.
 fn served(kind: SampleKind, lines: &[&[u8]]) -> Vec<u8> {
     let mut settings = listening(&[TCP]);
-    settings.plan.kind = Some(kind);
-    settings.plan.aid = Aid::Auto;
+    settings.hub.plan.kind = Some(kind);
+    settings.hub.plan.aid = Aid::Auto;
     let daemon = Daemon::start(settings);
     let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
     let mut sender = Client::tcp(daemon.address(0));

@@ -5,7 +5,7 @@ use super::daemon::{Daemon, TCP, WS, eventually, listening, strapd};
 use serde_json::Value;
 use std::net::TcpListener;
 use std::process::{Command, Output, Stdio};
-use strapd::serve::admission::Token;
+use strapd::serve::guard::admission::Token;
 use strapd_attitude::estimate::Aid;
 
 const LOG: &str = "fixtures/xsens_mti.mcap";
@@ -39,7 +39,7 @@ fn what_is_sent_becomes_the_attitude_of_a_replay_over_every_transport() {
     let unix = format!("unix-listen://{}", dir.path().join("s").display());
     for way in ["tcp", "ws", "unix"] {
         let mut settings = listening(&[TCP, WS, &unix]);
-        settings.plan.aid = Aid::Auto;
+        settings.hub.plan.aid = Aid::Auto;
         let daemon = Daemon::start(settings);
         let address = match way {
             "tcp" => format!("tcp://{}", daemon.address(0)),
@@ -101,7 +101,7 @@ fn the_token_is_shown_and_its_absence_is_said() {
         std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
     }
     let mut settings = listening(&[TCP, WS]);
-    settings.token = Some(Token::new("correct horse battery"));
+    settings.hub.token = Some(Token::new("correct horse battery"));
     let daemon = Daemon::start(settings);
     for address in [
         format!("tcp://{}", daemon.address(0)),

@@ -5,14 +5,14 @@ use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening};
 use std::io::{BufRead, Write};
 use std::net::TcpStream;
 use std::time::Duration;
-use strapd::serve::limits::Limits;
+use strapd::serve::guard::limits::Limits;
 
 /// More than the buffers of two sockets on loopback and an outbox hold.
 const ENOUGH: u64 = 200_000;
 
 fn with_patience(no_progress: Duration) -> Daemon {
     let mut settings = listening(&[TCP]);
-    settings.limits = Limits {
+    settings.hub.limits = Limits {
         no_progress,
         ..Limits::default()
     };

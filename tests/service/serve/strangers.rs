@@ -8,9 +8,8 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
-use strapd::serve::Settings;
-use strapd::serve::admission::Token;
-use strapd::serve::limits::Limits;
+use strapd::serve::guard::admission::Token;
+use strapd::serve::guard::limits::Limits;
 use tungstenite::client::IntoClientRequest;
 
 const SECRET: &str = "correct horse battery";
@@ -18,11 +17,10 @@ const AUTH: &str = "{\"class\":\"AUTH\",\"token\":\"correct horse battery\"}";
 const WRONG: &str = "{\"class\":\"AUTH\",\"token\":\"wrong horse battery\"}";
 
 fn guarded(limits: Limits) -> Daemon {
-    Daemon::start(Settings {
-        token: Some(Token::new(SECRET)),
-        limits,
-        ..listening(&[TCP, WS])
-    })
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.token = Some(Token::new(SECRET));
+    settings.hub.limits = limits;
+    Daemon::start(settings)
 }
 
 /// Has shown the token and was answered, or has found no place.
@@ -84,15 +82,14 @@ fn clients_that_pipeline_and_never_read_shut_nobody_out() {
 
 #[test]
 fn an_answer_that_is_not_taken_ends() {
-    let daemon = Daemon::start(Settings {
-        limits: Limits {
-            no_progress: Duration::from_millis(500),
-            // Nobody has to give way: each ends by itself.
-            http: 1000,
-            ..Limits::default()
-        },
-        ..listening(&[WS])
-    });
+    let mut settings = listening(&[WS]);
+    settings.hub.limits = Limits {
+        no_progress: Duration::from_millis(500),
+        // Nobody has to give way: each ends by itself.
+        http: 1000,
+        ..Limits::default()
+    };
+    let daemon = Daemon::start(settings);
     let mut attackers: Vec<TcpStream> = (0..64).map(|_| pipeline(daemon.address(0))).collect();
     eventually("all to be closed", || {
         attackers.retain_mut(|stream| still_there(&stream.write_all(b"GET / HTTP/1.1\r\n")));
@@ -144,14 +141,13 @@ fn who_has_not_shown_the_token_keeps_nobody_out_who_does() {
 
 #[test]
 fn who_sends_and_watches_nothing_gives_way_when_places_are_short_and_not_before() {
-    let daemon = Daemon::start(Settings {
-        limits: Limits {
-            connections: 4,
-            idle: Duration::from_millis(1500),
-            ..Limits::default()
-        },
-        ..listening(&[TCP, WS])
-    });
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.limits = Limits {
+        connections: 4,
+        idle: Duration::from_millis(1500),
+        ..Limits::default()
+    };
+    let daemon = Daemon::start(settings);
     let address = daemon.address(0);
     let mut watcher = Client::tcp(address).watching("{\"class\":\"WATCH\"}");
     let mut sender = Client::tcp(address);

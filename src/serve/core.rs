@@ -1,0 +1,30 @@
+//! What clients say -> sensors -> what clients get: the daemon without a socket. Locks; sans-I/O.
+//!
+//! | file | arrow | |
+//! |---|---|---|
+//! | [`session`] | one client's lines -> hub, answers | sans-I/O |
+//! | [`viewer`] | the same for Foxglove's viewers: messages in place of lines | sans-I/O |
+//! | `owned` | the sensors one client sends -> hub, and again when they were put away | locks |
+//! | [`hub`] | samples -> attitudes -> outboxes | locks |
+//! | [`stream`] | samples of one sensor -> attitudes | pure |
+//! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
+//! | [`outbox`] | attitudes -> what one client gets, bounded | locks |
+//! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
+//! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
+//! | `outgoing` | a source that is connected to, and how that stands | locks |
+//! | `read_buffer` | a thread's room for one read and the work on it | reads the clock |
+//! | [`context`] | what every task of a listener, source or output needs | |
+
+pub mod channel;
+pub mod context;
+pub mod hub;
+pub mod last;
+pub mod outbox;
+pub(super) mod outgoing;
+pub(super) mod owned;
+pub(super) mod read_buffer;
+pub mod recorder;
+pub mod session;
+pub mod state;
+pub mod stream;
+pub mod viewer;

@@ -1,0 +1,20 @@
+//! What every task of a listener, a source or an output needs.
+
+use super::hub::Hub;
+use crate::serve::guard::admission::Web;
+use crate::serve::guard::places::Places;
+use crate::serve::guard::shutdown::Running;
+use std::sync::Arc;
+
+/// Context that every listener needs.
+#[derive(Clone, Debug)]
+pub struct Context {
+    /// The hub.
+    pub hub: Arc<Hub>,
+    /// Names and pages that may connect over HTTP.
+    pub web: Arc<Web>,
+    /// A place for each connection.
+    pub places: Arc<Places>,
+    /// Lives as long as the task.
+    pub running: Running,
+}

@@ -1,0 +1,540 @@
+//! Attitudes <-> the file a restarted daemon goes on from (`--state`). Pure, but for [`StateFile`].
+//!
+//! One JSON object, written under another name, synced and renamed: whatever happens, there is a whole
+//! one, at most a second old. Since the file is replaced again and again, the lock that keeps a second daemon
+//! out is that of another one beside it, `.NAME.lock`, which stays.
+
+use super::stream::run::Span;
+use crate::error::{Error, Result};
+use crate::sink::{self, claim_or_warn, sync_directory};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::Memory;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
+use strapd_attitude::record::TimeUnit;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
+use strapd_recording::text::printable;
+
+/// Version that this release writes. 1 had neither the run nor the memory.
+pub(in crate::serve) const FORMAT: u32 = 2;
+/// A larger file is none of ours: a sensor takes no more than 10 KiB.
+const MAX_BYTES: u64 = 64 << 20;
+/// Largest variance, rad^2: an attitude of which nothing is known has pi^2 about each axis.
+const MAX_VARIANCE: f64 = 1e3;
+/// Rounding of a variance of nothing.
+const ROUNDING: f64 = 1e-12;
+/// Largest rate, rad/s.
+const MAX_RATE: f64 = 1e9;
+/// The last attitude of a sensor, and between which axes it is.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Saved {
+    /// Nanoseconds since the epoch of the sensor's clock.
+    stamp_ns: i64,
+    /// Sensor to world, w, x, y, z.
+    q: [f64; 4],
+    /// rad/s.
+    rate: [f64; 3],
+    /// rad^2: xx, xy, xz, yy, yz, zz.
+    covariance: [f64; 6],
+    reset: u32,
+    world: String,
+    body: String,
+    /// First stamp of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    first_ns: Option<i64>,
+    /// Last stamp that was taken, where the last attitude is an older one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    last_ns: Option<i64>,
+    /// Unit of stamps that do not say theirs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    unit: Option<String>,
+    /// Number of the next attitude.
+    #[serde(default)]
+    seq: u64,
+    /// Memory of the estimator, to go on exactly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    memory: Option<Box<Memory>>,
+}
+
+/// The last attitudes of all sensors, by `id`.
+pub type Sensors = BTreeMap<String, Saved>;
+
+#[derive(Serialize, Deserialize)]
+struct Document<S> {
+    strapd_state: u32,
+    sensors: S,
+}
+
+impl Saved {
+    /// Makes it of a stream with these labels.
+    #[must_use]
+    pub fn new(last: &AttitudeSample, labels: &sink::Stream) -> Saved {
+        Saved {
+            stamp_ns: last.stamp.0,
+            q: last.q_nb.wxyz(),
+            rate: last.rate.into(),
+            covariance: last.covariance.upper(),
+            reset: last.reset_count,
+            world: labels.world_axes.clone(),
+            body: labels.body_axes.clone(),
+            first_ns: None,
+            last_ns: None,
+            unit: None,
+            seq: 0,
+            memory: None,
+        }
+    }
+
+    /// Adds the run, which began with this stamp, before the attitude with number `seq`.
+    #[must_use]
+    pub fn in_run(
+        self,
+        first: Option<Nanos>,
+        seq: u64,
+        unit: Option<TimeUnit>,
+        memory: Option<Memory>,
+    ) -> Saved {
+        let last = memory.as_ref().and_then(Memory::last);
+        Saved {
+            first_ns: first.map(|f| f.0),
+            last_ns: last.map(|l| l.0).filter(|l| *l != self.stamp_ns),
+            seq,
+            unit: unit.map(|unit| unit.name().to_owned()),
+            // What would be refused is not saved: the attitude alone is held, as from other settings.
+            memory: memory.filter(Memory::is_plausible).map(Box::new),
+            ..self
+        }
+    }
+
+    /// Span of the run.
+    pub(super) fn span(&self) -> Span {
+        Span {
+            first: self.first_ns.map(Nanos),
+            last: Nanos(self.last_ns.unwrap_or(self.stamp_ns)),
+        }
+    }
+
+    /// Number of the next attitude.
+    #[must_use]
+    pub fn next_seq(&self) -> u64 {
+        // Who has written another number there must not make the count overflow.
+        self.seq.min(u64::MAX / 4)
+    }
+
+    /// The unit of stamps that do not say theirs.
+    #[must_use]
+    pub fn unit(&self) -> Option<TimeUnit> {
+        TimeUnit::named(self.unit.as_deref()?)
+    }
+
+    /// Number of times it has been reset.
+    #[must_use]
+    pub fn resets(&self) -> u32 {
+        self.reset
+    }
+
+    /// Memory of the estimator.
+    #[must_use]
+    pub fn memory(&self) -> Option<&Memory> {
+        self.memory.as_deref()
+    }
+
+    /// Checks that a daemon can have saved it.
+    ///
+    /// # Errors
+    /// In words: what cannot be.
+    pub(in crate::serve) fn check(&self) -> std::result::Result<(), String> {
+        let norm = self.q.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-6 {
+            return Err("`q` is no unit quaternion".to_owned());
+        }
+        let [xx, xy, xz, yy, yz, zz] = self.covariance;
+        let is_variance = |v: f64| (-ROUNDING..=MAX_VARIANCE).contains(&v);
+        let is_within = |both: f64, a: f64, b: f64| {
+            both.powi(2) <= a.max(0.0) * b.max(0.0) * (1.0 + 1e-6) + ROUNDING
+        };
+        let is_covariance = [xx, yy, zz].into_iter().all(is_variance)
+            && is_within(xy, xx, yy)
+            && is_within(xz, xx, zz)
+            && is_within(yz, yy, zz);
+        if !is_covariance {
+            return Err("`covariance` is none".to_owned());
+        }
+        if !self.rate.iter().all(|rate| rate.abs() <= MAX_RATE) {
+            return Err("`rate` is none".to_owned());
+        }
+        match self.memory().is_none_or(Memory::is_plausible) {
+            true => Ok(()),
+            false => Err("`memory` holds what no filter can know".to_owned()),
+        }
+    }
+
+    /// Attitude as it was.
+    ///
+    /// # Errors
+    /// In words: it is between other axes than those of the stream that is to go on from it.
+    pub fn attitude(
+        &self,
+        labels: &sink::Stream,
+    ) -> std::result::Result<AttitudeSample, Diagnostic> {
+        let saved = (&self.world, &self.body);
+        let wanted = (&labels.world_axes, &labels.body_axes);
+        if saved != wanted {
+            return Err(format!(
+                "the attitude saved is of body {} in world {}, and now body {} in world {} is asked for: begun anew",
+                self.body, self.world, labels.body_axes, labels.world_axes
+            ).into());
+        }
+        Ok(AttitudeSample {
+            stamp: Nanos(self.stamp_ns),
+            q_nb: Quaternion::assume_unit(self.q),
+            rate: BodyRate(self.rate.into()),
+            accel: None,
+            covariance: AttitudeCovariance::from_upper(self.covariance),
+            status: Status::OK,
+            reset_count: self.reset,
+            log: Nanos(self.stamp_ns),
+        })
+    }
+}
+
+/// Checks that a daemon can have saved all of them.
+///
+/// # Errors
+/// In words: which sensor's state cannot be, and why.
+pub(in crate::serve) fn check(sensors: &Sensors) -> std::result::Result<(), String> {
+    sensors.iter().try_for_each(|(id, saved)| {
+        let named = |why| format!("sensor {}: {why}", printable(id));
+        saved.check().map_err(named)
+    })
+}
+
+/// The file.
+#[derive(Debug)]
+pub struct StateFile {
+    path: PathBuf,
+    temporary: PathBuf,
+    written: Vec<u8>,
+    /// Locked while this daemon lives.
+    _lock: File,
+}
+
+impl StateFile {
+    /// Reads what a daemon before this one has left, if there was one, and shows that the file can be
+    /// written, and that no other daemon does.
+    ///
+    /// # Errors
+    /// [`strapd_recording::Error::Open`], [`Error::Write`]; [`Error::Usage`] when it is no state file: to begin anew in
+    /// silence would be to give an attitude nobody expects.
+    pub fn open(path: &Path) -> Result<(StateFile, Sensors)> {
+        let failed = |source| strapd_recording::Error::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let exists = match std::fs::metadata(path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => false,
+            Err(source) => return Err(failed(source).into()),
+            // To open a FIFO is to wait for its other end, and what is replaced must be a file.
+            Ok(found) if !found.is_file() => {
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "--state {}: is no regular file",
+                        path.display()
+                    ))
+                    .help(
+                        "name a file in a folder that the daemon may write to; it is made if it is not there",
+                    )
+                ));
+            }
+            Ok(_) => true,
+        };
+        // First of all: what another daemon writes is no state to go on from.
+        let lock = locked(path)?;
+        let sensors = match exists {
+            true => read(path, File::open(path).map_err(failed)?)?,
+            false => Sensors::new(),
+        };
+        let mut file = StateFile {
+            temporary: beside(path, ".part"),
+            path: path.to_owned(),
+            written: Vec::new(),
+            _lock: lock,
+        };
+        file.write(&sensors)?;
+        Ok((file, sensors))
+    }
+
+    /// Replaces its content, unless that is the same.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; what was there before is there still.
+    pub fn write(&mut self, sensors: &Sensors) -> Result<()> {
+        let document = Document {
+            strapd_state: FORMAT,
+            sensors,
+        };
+        let failed = |source| Error::Write {
+            path: self.path.clone(),
+            source,
+        };
+        let mut text = serde_json::to_vec(&document).map_err(|e| failed(e.into()))?;
+        text.push(b'\n');
+        if text == self.written {
+            return Ok(());
+        }
+        // What a crash has left, or somebody has put there.
+        match std::fs::remove_file(&self.temporary) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(e)),
+            _ => {}
+        }
+        let mut options = OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let replaced = options.open(&self.temporary).and_then(|mut file| {
+            file.write_all(&text)?;
+            file.sync_all()?;
+            std::fs::rename(&self.temporary, &self.path)?;
+            sync_directory(&self.path)
+        });
+        replaced.map_err(failed)?;
+        self.written = text;
+        Ok(())
+    }
+}
+
+/// The name of a hidden file in the same folder.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(ending);
+    path.with_file_name(name)
+}
+
+/// The file that is locked in place of the one at `path`.
+///
+/// # Errors
+/// [`Error::Write`]: another daemon has it, or it cannot be made.
+fn locked(path: &Path) -> Result<File> {
+    let lock = beside(path, ".lock");
+    let failed = |path: &Path, source| Error::Write {
+        path: path.to_owned(),
+        source,
+    };
+    // What is no file may be waited for without end, or be somebody else's.
+    if lock.symlink_metadata().is_ok_and(|found| !found.is_file()) {
+        let why = io::Error::new(
+            io::ErrorKind::AlreadyExists,
+            "is in the way and is no regular file",
+        );
+        return Err(failed(&lock, why));
+    }
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(false);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = options.open(&lock).map_err(|e| match e.kind() {
+        io::ErrorKind::NotFound => failed(path, e),
+        _ => failed(&lock, e),
+    })?;
+    claim_or_warn(&file, path).map_err(|e| failed(path, e))?;
+    Ok(file)
+}
+
+fn read(path: &Path, file: File) -> Result<Sensors> {
+    let mut text = Vec::new();
+    let read = file.take(MAX_BYTES).read_to_end(&mut text);
+    read.map_err(|source| strapd_recording::Error::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    let foreign = |why: String| {
+        Error::usage(
+            Diagnostic::new(format!("--state {}: {why}", path.display()))
+                .help("move it away to begin anew"),
+        )
+    };
+    let document: Document<Sensors> = serde_json::from_slice(&text)
+        .map_err(|e| foreign(format!("is no state that strapd has saved: {e}")))?;
+    if !(1..=FORMAT).contains(&document.strapd_state) {
+        return Err(foreign(format!(
+            "is of format {}, and this release reads 1 to {FORMAT}",
+            document.strapd_state
+        )));
+    }
+    check(&document.sensors)
+        .map_err(|why| foreign(format!("is no state that strapd has saved: {why}")))?;
+    Ok(document.sensors)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::serve::core::hub::{Hub, Settings};
+    use crate::serve::core::session::{Scratch, Session};
+    use nalgebra::Vector3;
+    use serde_json::Value;
+    use std::sync::Arc;
+    use strapd_attitude::estimate::{Aid, Plan};
+
+    fn sample() -> AttitudeSample {
+        AttitudeSample {
+            stamp: Nanos(1_700_000_000_123_456_789),
+            q_nb: Quaternion::assume_unit([0.6, 0.0, 0.8, 0.0]),
+            rate: BodyRate(Vector3::new(0.1, 0.2, 1.0 / 3.0)),
+            accel: None,
+            covariance: AttitudeCovariance::from_sigma(Vector3::new(0.1, 0.2, 0.3)),
+            status: Status::OK,
+            reset_count: 3,
+            log: Nanos(1_700_000_000_123_456_789),
+        }
+    }
+
+    /// A daemon that goes on from these for five seconds of samples; how uncertain the last attitude is, as a client
+    /// is told.
+    fn gone_on(saved: Sensors, from: u64) -> (Sensors, Value) {
+        let settings = Settings {
+            saved,
+            plan: Plan {
+                aid: Aid::Gravity,
+                ..Plan::default()
+            },
+            ..Settings::default()
+        };
+        let hub = Arc::new(Hub::new(settings).unwrap());
+        let mut session = Session::new(&hub, "sender".to_owned(), true);
+        let mut scratch = Scratch::default();
+        for n in from..from + 500 {
+            let (secs, nanos) = (1_700_000_000 + n / 100, n % 100 * 10_000_000);
+            let line = format!(
+                "{{\"id\":\"imu\",\"stamp\":{{\"sec\":{secs},\"nsec\":{nanos}}},\"gyro\":[0.01,-0.02,0.{n:03}],\"accel\":[0.1,0.2,9.8],\"mag\":[20,5,-40]}}\n",
+                n = n % 7
+            );
+            session.bytes(line.as_bytes(), Nanos(0), &mut scratch);
+            while session.is_held() {
+                session.go_on(&mut scratch);
+            }
+        }
+        let status: Value = serde_json::from_slice(&hub.status()).unwrap();
+        (
+            hub.saved(),
+            status["sources"][0]["attitude"]["sigma_deg"].clone(),
+        )
+    }
+
+    /// Calls with every number of a value changed in turn.
+    fn changed(value: &Value, to: &[f64], call: &mut impl FnMut(String, Value)) {
+        let pointers = {
+            let mut all = Vec::new();
+            let mut open = vec![(String::new(), value)];
+            while let Some((at, value)) = open.pop() {
+                match value {
+                    Value::Number(_) => all.push(at),
+                    Value::Array(some) => {
+                        open.extend(
+                            some.iter()
+                                .enumerate()
+                                .map(|(n, v)| (format!("{at}/{n}"), v)),
+                        );
+                    }
+                    Value::Object(some) => {
+                        open.extend(some.iter().map(|(name, v)| (format!("{at}/{name}"), v)));
+                    }
+                    _ => {}
+                }
+            }
+            all
+        };
+        for at in pointers {
+            for number in to {
+                let mut other = value.clone();
+                if let Some(place) = other.pointer_mut(&at) {
+                    *place = (*number).into();
+                }
+                call(format!("{at} = {number:e}"), other);
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_that_cannot_be_is_refused_or_does_no_lasting_harm() {
+        let (sensors, sigma) = gone_on(Sensors::new(), 0);
+        assert!(sigma["tilt"].is_f64(), "{sigma}");
+        let text = serde_json::to_value(&sensors).unwrap();
+        let (mut refused, mut taken, mut harmed) = (0, 0, Vec::new());
+        changed(&text, &[-1e308, 1e308, -1.0], &mut |what, other| {
+            let Ok(sensors) = serde_json::from_value::<Sensors>(other) else {
+                refused += 1;
+                return;
+            };
+            if check(&sensors).is_err() {
+                refused += 1;
+                return;
+            }
+            taken += 1;
+            let (after, sigma) = gone_on(sensors, 500);
+            let is_known = |name: &str| {
+                let sigma = sigma[name].as_f64();
+                sigma.is_some_and(|s| (0.0..1e3).contains(&s))
+            };
+            // What it leaves is taken again.
+            if !is_known("tilt") || !is_known("heading") || check(&after).is_err() {
+                harmed.push(format!("{what}: {sigma} {:?}", check(&after)));
+            }
+        });
+        assert!(harmed.is_empty(), "{harmed:#?}");
+        assert!(refused > taken && taken > 0, "{refused} {taken}");
+        // The one that was found, and the words.
+        let mut other = text.clone();
+        other["imu"]["covariance"][0] = (-1e308).into();
+        let why = check(&serde_json::from_value(other).unwrap()).unwrap_err();
+        assert_eq!(why, "sensor imu: `covariance` is none");
+    }
+
+    #[test]
+    fn what_was_saved_comes_back_to_the_bit_and_only_between_the_same_axes() -> Result<()> {
+        let dir = std::env::temp_dir().join(format!("strapd-state-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).map_err(|e| Error::usage(e.to_string()))?;
+        let path = dir.join("s.json");
+        let labels = sink::Stream::new("imu", "");
+        let (mut file, found) = StateFile::open(&path)?;
+        assert!(found.is_empty());
+        let sensors = Sensors::from([("imu".to_owned(), Saved::new(&sample(), &labels))]);
+        file.write(&sensors)?;
+        // One daemon at a time.
+        let said = StateFile::open(&path).err().map(|e| e.to_string());
+        assert!(said.is_some_and(|s| s.contains("is writing it")));
+        drop(file);
+        let (_, found) = StateFile::open(&path)?;
+        assert_eq!(found, sensors);
+        assert_eq!(
+            found.get("imu").map(|s| s.attitude(&labels)),
+            Some(Ok(sample()))
+        );
+        let other = sink::Stream {
+            world_axes: "ned".to_owned(),
+            ..labels
+        };
+        assert!(found.values().all(|s| s.attitude(&other).is_err()));
+
+        for damaged in [
+            "",
+            "{}",
+            "{\"strapd_state\":3,\"sensors\":{}}",
+            "\u{0}\u{0}",
+        ] {
+            std::fs::write(&path, damaged).map_err(|e| Error::usage(e.to_string()))?;
+            let said = StateFile::open(&path).err().map(|e| e.to_string());
+            assert!(
+                said.is_some_and(|s| s.contains("move it away")),
+                "{damaged}"
+            );
+        }
+        std::fs::remove_dir_all(&dir).map_err(|e| Error::usage(e.to_string()))
+    }
+}

@@ -1,0 +1,675 @@
+//! Raw samples of one sensor -> attitudes, live. Pure.
+//!
+//! The estimator is the one of a replay; what differs is decided here: the method needs no later
+//! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
+//! come and go ([`run`]).
+
+pub(super) mod attitude_now;
+mod intervals;
+mod losing;
+mod resetting;
+pub mod run;
+mod stamp_unit;
+pub mod stamps;
+
+use crate::pipeline::session_builder::labelled;
+use crate::report::calibration;
+use crate::report::findings::{Finding, of_sensor};
+use crate::serve::core::channel::Channel;
+use crate::serve::core::channel::health::Health;
+use crate::serve::core::recorder::stream_of;
+use crate::serve::core::state::Saved;
+use crate::serve::guard::fault::Fault;
+use crate::sink::Stream;
+use intervals::Intervals;
+pub use losing::Fate;
+use losing::Losing;
+use resetting::Resetting;
+use run::{Placed, SampleRun, Span, Standing};
+use stamp_unit::StampUnit;
+use stamps::{Stamps, Taken};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+use strapd_attitude::condition::{Clock, Report};
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::Estimator;
+use strapd_attitude::estimate::{Aid, Bias, Forces, Memory, Plan};
+use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
+use strapd_attitude::propagate::{Method, Sequential};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
+use strapd_attitude::record::{Declared, TimeUnit};
+use strapd_recording::decode::{Ambiguous, Bare, Line};
+use strapd_recording::recording::early_besides;
+
+/// Bit that says that unused forces were logged; the bits below are verdicts.
+const FORCES: u32 = 1 << 31;
+
+/// Numbers a sample may come behind its turn. Further back, the sender counts anew.
+const OVERTAKEN: u64 = 64;
+
+/// Nobody who goes on in the same unit begins later than so long after the last stamp.
+const NEAR_NANOS: i64 = 3_600_000_000_000;
+
+/// One sensor: its estimator, what its attitudes are called, and what has been said of it.
+#[derive(Debug)]
+pub struct SensorStream {
+    id: Arc<str>,
+    estimator: Estimator,
+    channel: Arc<Channel>,
+    resolved: Meaning,
+    prepared: Prepared,
+    /// Progress of a sender that has just come, whose first stamp is still to decide where it stands.
+    joining: Joining,
+    /// State to go on from, until a stamp has decided that.
+    saved: Option<Saved>,
+    /// The unit of stamps that do not say theirs.
+    stamps: Stamps,
+    /// Fault to report of them.
+    ambiguous: Option<Fault>,
+    /// Why there is no unit.
+    why_no_stamp: Option<String>,
+    /// Whether the samples' intervals can be true.
+    intervals: Intervals,
+    /// Check of the unit of its stamps.
+    stamp_unit: StampUnit,
+    /// Reset that was asked of it.
+    resetting: Resetting,
+    /// First stamp of the run.
+    first: Option<Nanos>,
+    /// Runs begun by a connection since the start.
+    runs: u64,
+    /// Number of the next attitude, and of the first since the start.
+    next_seq: u64,
+    first_seq: u64,
+    /// The sender's number expected next.
+    expected: Option<u64>,
+    /// Samples that by the sender's numbers did not come in their turn: never, or late.
+    missing: u64,
+    last: Option<AttitudeSample>,
+    /// Distance of a step from the ordinary one, s, smoothed over about 16 steps.
+    jitter_secs: f64,
+    /// Verdicts that were said to who sends it, as bits, and what was counted when it came.
+    told: u32,
+    counted: Counts,
+    losing: Losing,
+    /// Specific forces came that this attitude cannot use.
+    has_unused_forces: bool,
+    /// Forces and fields that came before the first rate, the last few.
+    early: VecDeque<RawSample>,
+}
+
+/// Progress in finding where a sender stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Joining {
+    /// Undecided: no stamp of it has come yet.
+    Undecided,
+    /// Repetition: it sends again what was taken, up to this.
+    Again(Nanos),
+    /// Joined: it is where the run is.
+    Joined,
+}
+
+/// The plan as it is for live streams: `auto` is the method without latency.
+///
+/// # Errors
+/// In words, with the flag that helps: what a live stream cannot do.
+pub fn live_plan(plan: &Plan) -> Result<Plan, Diagnostic> {
+    let mut plan = plan.clone();
+    if plan.method == Method::Auto {
+        plan.method = "commit"
+            .parse::<Method>()
+            .map_err(|e| Diagnostic::from(&e))?;
+    }
+    let resolved = Meaning::new(&plan, &Declared::default());
+    // An orientation and a specific force, so that only what no sample can bring is refused.
+    let sample = RawSample {
+        accel: Some([0.0, 0.0, 9.81]),
+        orientation: Some(
+            Quaternion::<strapd_attitude::frames::Nav, strapd_attitude::frames::Body>::identity()
+                .wxyz(),
+        ),
+        ..RawSample::default()
+    };
+    let prepared = at_once(&plan, &resolved, &[sample])?;
+    Estimator::live(&plan, &resolved, &prepared)?;
+    Ok(plan)
+}
+
+impl SensorStream {
+    /// Makes one for the sensor `id`, whose first line states `stated` and brings `together`. `plan` is a
+    /// [`live_plan`]. It goes on from `saved`, where there is such and the stamps do; `declare` makes its
+    /// labels known to clients.
+    ///
+    /// # Errors
+    /// The fault to answer with: the samples do not fit the plan.
+    pub fn new(
+        plan: &Plan,
+        id: Arc<str>,
+        stated: &Line,
+        together: &[RawSample],
+        saved: Option<Saved>,
+        declare: impl FnOnce(&Stream) -> Arc<Channel>,
+    ) -> Result<SensorStream, Fault> {
+        let fault = |what: Diagnostic| Fault {
+            id: Some(id.to_string()),
+            ..Fault::new("not_ready", what.to_string())
+        };
+        let declared = Declared {
+            sample_kind: stated.sample_kind,
+            gyro_unit: stated.gyro_unit,
+            ..Declared::default()
+        };
+        let resolved = Meaning::new(plan, &declared);
+        let memory = saved.as_ref().and_then(Saved::memory);
+        let plan = &expecting(plan, memory.is_some_and(Memory::has_forces_beside));
+        let mut prepared = at_once(plan, &resolved, together).map_err(fault)?;
+        let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        let known = plan.calibration.as_deref();
+        prepared
+            .warnings
+            .extend(known.and_then(|known| known.mismatch(&id)).map(Into::into));
+        let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
+        let saved = saved.filter(|saved| match saved.attitude(&labels) {
+            Ok(_) => true,
+            Err(why) => {
+                prepared.warnings.push(why);
+                false
+            }
+        });
+        let first_seq = saved.as_ref().map_or(0, Saved::next_seq);
+        Ok(SensorStream {
+            channel: declare(&labels),
+            id,
+            estimator,
+            resolved,
+            prepared,
+            joining: Joining::Undecided,
+            stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
+            ambiguous: None,
+            why_no_stamp: None,
+            intervals: Intervals::default(),
+            stamp_unit: StampUnit::default(),
+            resetting: Resetting::default(),
+            saved,
+            first: None,
+            runs: 0,
+            next_seq: first_seq,
+            first_seq,
+            expected: None,
+            missing: 0,
+            last: None,
+            jitter_secs: 0.0,
+            told: 0,
+            counted: Counts::default(),
+            losing: Losing::default(),
+            has_unused_forces: false,
+            early: VecDeque::new(),
+        })
+    }
+
+    /// Channel as clients know it.
+    #[must_use]
+    pub fn channel(&self) -> &Arc<Channel> {
+        &self.channel
+    }
+
+    /// Name.
+    #[must_use]
+    pub fn id(&self) -> &Arc<str> {
+        &self.id
+    }
+
+    /// Whether a later line means the same by its numbers as the first. `plan` wins over both.
+    #[must_use]
+    pub fn agrees(&self, plan: &Plan, line: &Line) -> bool {
+        let (kind, unit) = (self.resolved.kind, self.resolved.unit);
+        plan.kind.or(line.sample_kind).unwrap_or(kind) == kind
+            && plan.unit.or(line.gyro_unit).unwrap_or(unit) == unit
+    }
+
+    /// Labels in a recording.
+    #[must_use]
+    pub fn recorded(&self) -> crate::sink::Stream {
+        self.channel.stream().clone()
+    }
+
+    /// State that a daemon after this one needs to go on; `None` before the first attitude.
+    #[must_use]
+    pub fn saved(&self) -> Option<Saved> {
+        if let Some(saved) = &self.saved {
+            return Some(saved.clone());
+        }
+        let saved = Saved::new(self.last.as_ref()?, self.channel.stream());
+        Some(saved.in_run(
+            self.first,
+            self.next_seq,
+            self.stamps.unit(),
+            self.estimator.memory(),
+        ))
+    }
+
+    /// Calibration of the sensor by now. `plan` is that of [`SensorStream::new`].
+    #[must_use]
+    pub fn calibration(&self, plan: &Plan) -> SensorCalibration {
+        // What a rest would have told was learned on the way.
+        let plan = Plan {
+            bias: match plan.bias {
+                Bias::Auto => Bias::None,
+                other => other,
+            },
+            ..plan.clone()
+        };
+        let filter = self.estimator.filter();
+        let known = learned((&plan, &self.resolved, &self.prepared), filter, None);
+        calibration::described(known, &self.id, "live", self.last.as_ref())
+    }
+
+    /// Somebody else sends it from now on, and hears again what is wrong with its samples.
+    pub fn meet(&mut self) {
+        self.joining = Joining::Undecided;
+        self.told = 0;
+        self.counted = self.conditioning().counts;
+        self.intervals.reopen();
+        self.stamp_unit.meet();
+    }
+
+    /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
+    /// are. Those whose stamps are bare numbers wait for the unit of all.
+    pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<Taken> {
+        let bare = run.bare.iter().flatten().next();
+        if self.joining == Joining::Undecided
+            && let Some(bare) = bare
+            && !self.continues(*bare)
+        {
+            self.stamps.reopen();
+        }
+        let (taken, why) = self
+            .stamps
+            .take(run.lines, run.samples, run.bare, run.received);
+        self.doubt(why);
+        taken
+    }
+
+    /// Whether samples wait for the unit of their stamps.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.stamps.is_waiting()
+    }
+
+    /// Whether some have waited for the unit of their stamps for long enough.
+    #[must_use]
+    pub fn is_overdue(&self, now: Nanos) -> bool {
+        self.stamps.is_overdue(now)
+    }
+
+    /// Takes those that wait for the unit of their stamps, when nobody is to wait any longer.
+    pub fn overdue(&mut self) -> Taken {
+        let (taken, why) = self.stamps.release(true);
+        self.doubt(why);
+        taken
+    }
+
+    fn doubt(&mut self, why: Option<Ambiguous>) {
+        let Some(why) = why else { return };
+        // Not said of each of them once more.
+        self.told |= 1 << Verdict::NoStamp as u32;
+        self.why_no_stamp = Some(why.to_string());
+        self.ambiguous = Some(Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new("ambiguous_stamp", why.to_string())
+        });
+    }
+
+    /// Whether a new connection's first number goes on in the unit settled for the run; where it does
+    /// not, that may be another run, or somebody who counts in another unit.
+    fn continues(&self, bare: Bare) -> bool {
+        let (Some(span), Some(unit)) = (self.span(), self.stamps.unit()) else {
+            return false;
+        };
+        let stamp = bare.in_unit(unit);
+        span.first.is_some_and(|first| stamp > first) && stamp.since(span.last) < NEAR_NANOS
+    }
+
+    fn span(&self) -> Option<Span> {
+        match &self.saved {
+            Some(saved) => Some(saved.span()),
+            None => self.conditioning().last.map(|last| Span {
+                first: self.first,
+                last,
+            }),
+        }
+    }
+
+    /// Decides by the first stamp of a sender whether the run goes on, before samples are taken.
+    /// `plan` is that of [`SensorStream::new`]. What is to be known of a run that has begun comes back.
+    ///
+    /// # Errors
+    /// The fault to answer with: a run cannot begin with these samples.
+    pub fn join(
+        &mut self,
+        plan: &Plan,
+        samples: &[RawSample],
+        window: Duration,
+        placed: Placed,
+    ) -> Result<Option<Fault>, Fault> {
+        if self.joining != Joining::Undecided || samples.iter().all(|raw| raw.is_beside) {
+            return Ok(None);
+        }
+        let span = self.span();
+        let near = span.map_or(Nanos(0), |span| span.last);
+        let first = samples
+            .iter()
+            .filter(|raw| !raw.is_beside)
+            .find_map(|raw| Some((raw, self.estimator.stamp_of(raw, near)?)));
+        let (span, raw, stamp) = match (span, first) {
+            (Some(span), Some((raw, stamp))) => (span, raw, stamp),
+            // Nothing to stand in yet, or nothing that tells where.
+            (None, Some(_)) => {
+                self.joining = Joining::Joined;
+                return Ok(None);
+            }
+            (_, None) if matches!(plan.clock, Clock::Index { .. }) => {
+                self.go_on(plan, None);
+                return Ok(None);
+            }
+            (_, None) => return Ok(None),
+        };
+        match span.standing(stamp, window, placed) {
+            Standing::GoesOn => {
+                self.go_on(plan, Some(stamp));
+                Ok(None)
+            }
+            Standing::Again => {
+                self.joining = Joining::Again(span.last);
+                Ok(None)
+            }
+            Standing::Anew => self.begin_anew(plan, raw, stamp, span).map(Some),
+        }
+    }
+
+    /// The run goes on with a sample stamped so.
+    fn go_on(&mut self, plan: &Plan, stamp: Option<Nanos>) {
+        self.joining = Joining::Joined;
+        let Some(saved) = self.saved.take() else {
+            return;
+        };
+        self.first = saved.span().first;
+        let step = stamp.map(|stamp| stamp.since(saved.span().last));
+        let is_near = step.is_some_and(|step| plan.bridges(step));
+        let resumed = match saved.memory().filter(|_| is_near) {
+            Some(memory) if self.estimator.recall(memory) => Ok(()),
+            _ => saved
+                .attitude(self.channel.stream())
+                .and_then(|last| self.estimator.resume(&last)),
+        };
+        match resumed {
+            Ok(()) => "as saved before the restart".clone_into(&mut self.prepared.initial_origin),
+            Err(why) => self.prepared.warnings.push(why),
+        }
+        self.last = saved.attitude(self.channel.stream()).ok();
+    }
+
+    /// A run begins with `raw`: the world is there anew, and only what was counted goes on.
+    fn begin_anew(
+        &mut self,
+        plan: &Plan,
+        raw: &RawSample,
+        stamp: Nanos,
+        before: Span,
+    ) -> Result<Fault, Fault> {
+        let fault = |what: Diagnostic| Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new("not_ready", what.to_string())
+        };
+        let forces = self.prepared.aiding.map(|aiding| aiding.forces);
+        let plan = &expecting(plan, forces == Some(Forces::Beside));
+        let prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
+        let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
+        let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
+        if labels.world_axes != self.channel.stream().world_axes {
+            return Err(fault(format!(
+                "a run that begins between other axes ({}) than those announced ({}); give it another `id`",
+                labels.world_axes,
+                self.channel.stream().world_axes
+            ).into()));
+        }
+        let saved = self.saved.take().map(|saved| saved.resets());
+        let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
+        estimator.succeed(self.conditioning(), resets);
+        (self.estimator, self.prepared) = (estimator, prepared);
+        (self.first, self.last) = (None, None);
+        self.joining = Joining::Joined;
+        self.intervals.begin();
+        self.stamp_unit.begin();
+        self.runs += 1;
+        let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
+        let seen = match before.first {
+            Some(first) => format!("{:.6} s to {:.6} s", secs(first), secs(before.last)),
+            None => format!("until {:.6} s", secs(before.last)),
+        };
+        Ok(Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new(
+                "new_run",
+                format!(
+                    "the first stamp of this connection, {:.6} s, was passed already ({seen}): a new run begins, reset {}",
+                    secs(stamp),
+                    resets.saturating_add(1)
+                ),
+            )
+        })
+    }
+
+    /// Whether a sample is one that was taken before, and now is only counted.
+    fn is_again(&mut self, plan: &Plan, raw: &RawSample) -> bool {
+        let Joining::Again(last) = self.joining else {
+            return false;
+        };
+        match self.estimator.stamp_of(raw, last) {
+            Some(stamp) if stamp > last => {
+                self.go_on(plan, Some(stamp));
+                false
+            }
+            Some(stamp) => {
+                self.estimator.take_late(stamp);
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Takes samples in the order they came, by the `plan` of [`SensorStream::new`]. The attitudes they
+    /// give come from `attitudes`.
+    pub fn take(&mut self, plan: &Plan, seq: Option<u64>, samples: &[RawSample]) {
+        if let Some(seq) = seq {
+            let expected = self.expected.unwrap_or(seq);
+            self.missing = self.missing.saturating_add(seq.saturating_sub(expected));
+            // One that was overtaken, or came twice, is no new beginning.
+            if seq >= expected || expected - seq > OVERTAKEN {
+                self.expected = Some(seq.saturating_add(1));
+            }
+        }
+        if self.joining == Joining::Joined {
+            for raw in self.early.drain(..) {
+                self.estimator.take(&raw);
+            }
+        }
+        for raw in samples {
+            if raw.is_beside {
+                self.take_beside(plan, raw);
+            } else if self.joining == Joining::Joined || !self.is_again(plan, raw) {
+                self.reset_if_asked(plan, raw);
+                self.estimator.take(raw);
+                self.intervals.take(raw, plan.clock, self.resolved.kind);
+                self.stamp_unit.take(raw, plan.clock);
+            }
+        }
+        self.first = self.first.or(self.conditioning().first);
+    }
+
+    /// A specific force or a field with a stamp of its own; until a rate has told where the run stands, it waits.
+    fn take_beside(&mut self, plan: &Plan, raw: &RawSample) {
+        if self.joining == Joining::Joined {
+            self.estimator.take(raw);
+        } else {
+            if self.early.len() == early_besides::MOST {
+                self.early.pop_front();
+            }
+            self.early.push_back(*raw);
+        }
+        let is_alone = self.prepared.aiding.is_none() && plan.aid == Aid::Auto;
+        self.has_unused_forces |= is_alone && raw.accel.is_some();
+    }
+
+    /// A line that could not be decoded stood here.
+    pub fn take_undecodable(&mut self) {
+        self.estimator.take_undecodable();
+    }
+
+    /// The attitudes of what was taken, and the number of the first.
+    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &Arc<Channel>) {
+        let first = self.next_seq;
+        let spacing = self.estimator.conditioning().spacing_nanos;
+        let attitudes = self.estimator.attitudes(&Sequential);
+        let mut before = self.last.map(|l| l.stamp);
+        for attitude in attitudes {
+            let step = before.map(|b| attitude.stamp.since(b));
+            before = Some(attitude.stamp);
+            // A step over missing samples is a gap.
+            if let (Some(spacing), Some(step)) = (spacing, step)
+                && step < spacing.saturating_mul(2)
+            {
+                // A saved stamp may be anything.
+                let off = step.saturating_sub(spacing).unsigned_abs() as f64 * 1e-9;
+                self.jitter_secs += (off - self.jitter_secs) / 16.0;
+            }
+        }
+        self.next_seq = self.next_seq.saturating_add(attitudes.len() as u64);
+        self.last = attitudes.last().copied().or(self.last);
+        (first, attitudes, &self.channel)
+    }
+
+    /// Frees memory when its attitudes are handed out and it waits for its next samples.
+    pub(crate) fn trim(&mut self) {
+        self.estimator.trim();
+    }
+
+    /// Faults found, and the kinds of loss that have happened, for the first time to who sends it, since
+    /// this was asked last.
+    pub fn news(&mut self) -> Vec<Fault> {
+        let counts = self.estimator.conditioning().counts;
+        let mut news = Vec::from_iter(self.ambiguous.take());
+        news.extend(self.intervals.news(&self.id));
+        news.extend(self.stamp_unit.news(&self.id));
+        if std::mem::take(&mut self.has_unused_forces) && self.told & FORCES == 0 {
+            self.told |= FORCES;
+            news.push(Fault {
+                id: Some(self.id.to_string()),
+                ..Fault::new("forces_unused", "specific forces come in messages of their own, and the first came after the attitude had begun with the gyro alone; start the daemon with --aid gravity, or send a force first. Said once".to_owned())
+            });
+        }
+        for verdict in Verdict::ALL {
+            let bit = 1 << verdict as u32;
+            let is_new = counts.get(verdict) > self.counted.get(verdict);
+            if self.told & bit == 0 && verdict.is_loss() && is_new {
+                self.told |= bit;
+                // An undecodable line was answered itself.
+                if verdict != Verdict::Undecodable {
+                    news.push(Fault {
+                        id: Some(self.id.to_string()),
+                        ..Fault::new(
+                            verdict.name(),
+                            format!("not used: {}. Said once; STATUS counts", explained(verdict)),
+                        )
+                    });
+                }
+            }
+        }
+        news
+    }
+
+    /// Report of conditioning.
+    #[must_use]
+    pub fn conditioning(&self) -> &Report {
+        self.estimator.conditioning()
+    }
+
+    /// Health, which a replay's streams report of themselves, too.
+    pub(in crate::serve) fn health(&self) -> Health {
+        Health::of(&self.estimator)
+    }
+
+    /// State for `STATUS`.
+    #[must_use]
+    pub fn status(&self) -> serde_json::Value {
+        let report = self.conditioning();
+        let warnings = &self.prepared.warnings;
+        let warnings: Vec<String> = warnings
+            .iter()
+            .map(ToString::to_string)
+            .chain(self.intervals.warning())
+            .collect();
+        let clock = self.prepared.clock.name();
+        let mut found = of_sensor(report, &self.estimator.propagation(), clock);
+        found.extend(self.stamp_unit.finding());
+        let stamp = |s: Nanos| {
+            let (sec, nsec) = s.to_sec_nanosec();
+            serde_json::json!({"sec": sec, "nsec": nsec})
+        };
+        let own = serde_json::json!({
+            "id": &*self.id,
+            // By the sender's numbers, not by the stamps.
+            "missing": self.missing,
+            "attitudes": self.next_seq - self.first_seq,
+            "new_runs": self.runs,
+            "resets": self.resetting.taken,
+            "reset": self.last.map_or(0, |l| l.reset_count),
+            "last_stamp": self.last.map(|l| stamp(l.stamp)),
+            "jitter_s": self.jitter_secs,
+            "stamp_unit": self.stamps.unit().map(TimeUnit::name),
+            "sample_kind": self.resolved.kind.name(),
+            "gyro_unit": self.resolved.unit.name(),
+            "world": self.channel.stream().world_axes,
+            "body": self.channel.stream().body_axes,
+            "initial": self.prepared.initial_origin,
+            "bias": self.prepared.bias_origin,
+            "interval_mismatches": self.intervals.found(),
+            "warnings": warnings,
+            "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
+        });
+        self.health().beside(own, self.last.as_ref())
+    }
+}
+
+/// The plan of a sensor whose specific forces are known to come in messages of their own.
+fn expecting(plan: &Plan, forces_beside: bool) -> Plan {
+    Plan {
+        has_forces_beside: plan.has_forces_beside || forces_beside,
+        ..plan.clone()
+    }
+}
+
+/// Meaning of a verdict for the one who sent the sample, and what helps.
+fn explained(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NoGyro => "a sample without a body rate (absent, or null as NaN becomes in JSON)",
+        Verdict::NotFinite => "a body rate that is not finite",
+        Verdict::Huge => {
+            "a body rate no gyro can have; if it is in degrees, start the daemon with --gyro-unit deg"
+        }
+        Verdict::DuplicateStamp => "two samples with one stamp and other data",
+        Verdict::Late => {
+            "a sample older than what was already integrated; send in order, and after a connection was lost from the first sample on (a new run) or from the last one taken"
+        }
+        Verdict::NoStamp => {
+            "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or start the daemon with --time log to use the time of arrival"
+        }
+        Verdict::StrayStamp => "a stamp far ahead of its neighbours",
+        Verdict::FarStamp => {
+            "a stamp more than 146 years from 1970; the sender's clock, or the unit of its stamps, is wrong"
+        }
+        other => other.name(),
+    }
+}

@@ -1,0 +1,130 @@
+//! The first stamp of a connection -> whether the sensor's run goes on. Pure.
+//!
+//! A run is what one estimator integrates. Who connects again may go on where it was, may send
+//! again what was sent before, or may begin anew with stamps that were used already; only the
+//! stamps tell, and to integrate the same samples twice would be an attitude nobody has.
+
+use crate::serve::protocol::wire::NAMELESS;
+use std::time::Duration;
+use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{Bare, Line};
+
+/// Whether a sender's samples have a place of their own beside their stamps.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Placed {
+    /// Place by stamp: the first stamp of a connection tells where it goes on.
+    #[default]
+    ByStamp,
+    /// Yes, as of a stream that a broker keeps: what was taken is not taken again, and a stamp
+    /// never begins a run.
+    ByPosition,
+}
+
+/// Samples of one sensor from one client that came together.
+#[derive(Debug)]
+pub struct SampleRun<'a> {
+    /// Number of the client they come from.
+    pub client: u64,
+    /// Contents of the first of their lines.
+    pub head: &'a Line,
+    /// Time at which they were received.
+    pub received: Nanos,
+    /// Place in their stream.
+    pub placed: Placed,
+    /// The sender's number of each line, and where its samples end.
+    pub lines: &'a [(Option<u64>, usize)],
+    /// The samples.
+    pub samples: &'a [RawSample],
+    /// Stamps that are numbers without a unit, at their places; shorter where no more follow.
+    pub bare: &'a [Option<Bare>],
+    /// The number of the first line, 0 where it has none, and its beginning.
+    pub first: (u64, &'a [u8]),
+}
+
+impl<'a> SampleRun<'a> {
+    /// The sensor it is of.
+    #[must_use]
+    pub fn id(&self) -> &'a str {
+        let id = self.head.id.as_deref();
+        id.filter(|id| !id.is_empty()).unwrap_or(NAMELESS)
+    }
+}
+
+/// Place of a connection's first sample.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Standing {
+    /// Continuation behind everything that was taken.
+    GoesOn,
+    /// Repetition among what was taken.
+    Again,
+    /// Beginning of a run.
+    Anew,
+}
+
+/// A run as far as it has come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(in crate::serve) struct Span {
+    /// First stamp, where that is known.
+    pub(in crate::serve) first: Option<Nanos>,
+    /// Last stamp.
+    pub(in crate::serve) last: Nanos,
+}
+
+impl Span {
+    /// Place of a connection whose first stamp is this. Further back than `window` nobody sends
+    /// again.
+    pub(super) fn standing(self, stamp: Nanos, window: Duration, placed: Placed) -> Standing {
+        let window = i64::try_from(window.as_nanos()).unwrap_or(i64::MAX);
+        if stamp > self.last {
+            Standing::GoesOn
+        } else if placed == Placed::ByPosition {
+            Standing::Again
+        } else if self.first.is_some_and(|first| stamp <= first) || self.last.since(stamp) > window
+        {
+            Standing::Anew
+        } else {
+            Standing::Again
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_stamp_decides_unless_the_sender_knows_its_position() {
+        let span = Span {
+            first: Some(Nanos(100)),
+            last: Nanos(200),
+        };
+        let window = Duration::from_nanos(50);
+        for (stamp, by_stamps, by_position) in [
+            (201, Standing::GoesOn, Standing::GoesOn),
+            (200, Standing::Again, Standing::Again),
+            (150, Standing::Again, Standing::Again),
+            (149, Standing::Anew, Standing::Again),
+            (100, Standing::Anew, Standing::Again),
+            (i64::MIN, Standing::Anew, Standing::Again),
+        ] {
+            let of = |placed| span.standing(Nanos(stamp), window, placed);
+            assert_eq!(of(Placed::ByStamp), by_stamps, "{stamp}");
+            assert_eq!(of(Placed::ByPosition), by_position, "{stamp}");
+        }
+        // A short run: its first sample again, although within the window.
+        let all = Duration::from_secs(60);
+        assert_eq!(
+            span.standing(Nanos(100), all, Placed::ByStamp),
+            Standing::Anew
+        );
+        // Of a file of an older release the first stamp is not known.
+        let old = Span {
+            first: None,
+            ..span
+        };
+        assert_eq!(
+            old.standing(Nanos(100), all, Placed::ByStamp),
+            Standing::Again
+        );
+    }
+}

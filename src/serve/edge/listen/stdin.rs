@@ -1,0 +1,59 @@
+//! Standard input -> a session. I/O.
+
+use crate::serve::core::hub::{Flood, Hub};
+use crate::serve::core::read_buffer::{now, with_read_buffer};
+use crate::serve::core::session::{Session, Side};
+use std::collections::VecDeque;
+use std::io::Read;
+use std::sync::Arc;
+
+/// Reads lines to the end of `input` on this thread; whoever started the daemon is trusted, and
+/// what is wrong with the lines is said in the log.
+pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
+    let side = Side::Deaf { trusted: true };
+    let mut session = Session::with(hub, "standard input".to_owned(), side);
+    let mut said = VecDeque::new();
+    let mut flood = Flood::default();
+    loop {
+        flood.wait_in_thread(hub);
+        let read = with_read_buffer(|buffer, scratch| {
+            let n = input.read(buffer)?;
+            flood.read(n, buffer.len());
+            match buffer.get(..n).unwrap_or_default() {
+                [] => session.finish(now(), scratch),
+                bytes => session.bytes(bytes, now(), scratch),
+            }
+            std::io::Result::Ok(n)
+        });
+        loop {
+            session.client().outbox.discard(&mut said);
+            for line in said.drain(..) {
+                let line = String::from_utf8_lossy(&line);
+                if line.contains("\"class\":\"ERROR\"") {
+                    let what = format!("standard input: {}", line.trim_end());
+                    crate::serve::guard::log_throttle::warn("stdin", &what);
+                }
+            }
+            if !session.is_held() {
+                break;
+            }
+            with_read_buffer(|_, scratch| session.go_on(scratch));
+        }
+        match read {
+            Ok(0) => {
+                tracing::info!("standard input has ended");
+                return;
+            }
+            Ok(_) if session.end().is_none() => {}
+            Ok(_) => {
+                tracing::warn!("standard input: too many bad lines; it is read no further");
+                return;
+            }
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => {
+                tracing::warn!("standard input: {e}");
+                return;
+            }
+        }
+    }
+}

@@ -1,0 +1,659 @@
+//! One line -> what it asks for; what is to be said -> one line. Pure.
+//!
+//! Samples go through the same [`LineDecoder`] as a replay of lines, attitudes through the same
+//! encoder as its output: here are only the objects of the conversation around them
+//! (`docs/protocol.md`).
+
+mod packing;
+mod reference;
+mod resetting;
+
+pub use packing::{broken_packed, packed_stream, unreadable};
+pub use reference::{Reference, TRUTH, stream as reference_stream};
+pub use resetting::{Reset, reset_answer};
+
+use super::chunk::{Dropped, MAX_QUEUED};
+use super::filter::{Class as Stream, Filter};
+use super::position::{Action, Position};
+use crate::serve::guard::fault::Fault;
+use bytes::Bytes;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::time::Duration;
+use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::packed::Form;
+use strapd_recording::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name};
+use strapd_recording::text::{printable, snippet};
+
+/// The name of a sensor that gives none.
+pub const NAMELESS: &str = "imu";
+/// Version of the protocol.
+pub const PROTO: u32 = 1;
+/// Longest name of a sensor, in bytes.
+pub const MAX_ID: usize = 255;
+
+/// Most sensors one `WATCH` can name: as many as there are, unless more are allowed.
+pub const MAX_WATCHED: usize = 1024;
+
+/// Request of a line.
+#[derive(Debug, PartialEq)]
+pub enum Message {
+    /// Samples of one sensor: they are in the buffer given.
+    Samples(Line),
+    /// Packed samples of this number are of this sensor from now on, and mean this.
+    Packed(u32, Line),
+    /// Start (or with `None` stop) the attitudes.
+    Watch(Option<Filter>),
+    /// Tell the state.
+    Poll,
+    /// Be elsewhere in a replay.
+    Playback(Action),
+    /// Begin a sensor's attitude anew; or why that cannot be, which is no fault of samples.
+    Reset(Result<Reset, Fault>),
+    /// Reference against which the sensors are compared.
+    Reference(Box<Reference>),
+    /// Here is the token.
+    Auth(String),
+}
+
+#[derive(Deserialize)]
+struct WatchObject {
+    #[serde(default = "yes")]
+    enable: bool,
+    streams: Option<Vec<String>>,
+    id: Option<Ids>,
+    ids: Option<Ids>,
+    rate_hz: Option<f64>,
+    #[serde(default)]
+    packed: bool,
+    #[serde(default = "yes")]
+    last: bool,
+}
+
+#[derive(Deserialize)]
+struct PlaybackObject {
+    action: String,
+    at: Option<StampObject>,
+    speed: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct StampObject {
+    sec: i64,
+    #[serde(default)]
+    nsec: u32,
+}
+
+#[derive(Deserialize)]
+struct AuthObject {
+    token: String,
+}
+
+/// One name or several.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Ids {
+    One(String),
+    Several(Vec<String>),
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Reads one line; samples are appended to `samples`, and only where the answer is
+/// [`Message::Samples`].
+///
+/// # Errors
+/// The [`Fault`] to answer with.
+pub fn read(
+    decoder: &LineDecoder,
+    line: &[u8],
+    received: Nanos,
+    samples: &mut Vec<RawSample>,
+) -> Result<Message, Fault> {
+    read_from(decoder, line, received, false, samples)
+}
+
+/// Whether all there are come from other sensors than the gyro.
+#[must_use]
+pub fn are_beside(samples: &[RawSample]) -> bool {
+    !samples.is_empty() && samples.iter().all(|s| s.is_beside)
+}
+
+/// The same of somebody we connected to: where that is a daemon, the rates of its attitudes are
+/// samples (`is_source`).
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(
+    decoder: &LineDecoder,
+    line: &[u8],
+    received: Nanos,
+    is_source: bool,
+    samples: &mut Vec<RawSample>,
+) -> Result<Message, Fault> {
+    let before = samples.len();
+    // Who cuts the lines keeps them short; the object of a body may be longer.
+    let head = decoder
+        .decode_object(line, received, samples)
+        .map_err(|why| undecodable(&why))?;
+    if head.class == Class::Rate {
+        // What says that it is of the gyro is, with a rate or without.
+        for sample in samples.iter_mut().skip(before) {
+            sample.is_beside = false;
+        }
+    }
+    let new = samples.get(before..).unwrap_or_default();
+    let has_rate = new.iter().any(|s| s.gyro.is_some());
+    let class = match &head.class {
+        // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
+        Class::Rate if samples.len() > before => return Ok(Message::Samples(head)),
+        Class::None | Class::Imu if has_rate => return Ok(Message::Samples(head)),
+        Class::None if are_beside(new) => return Ok(Message::Samples(head)),
+        Class::Att if is_source && has_rate => return Ok(Message::Samples(head)),
+        Class::Other(class) => Some(class.clone()),
+        Class::Att => Some("ATT".to_owned()),
+        Class::None | Class::Imu | Class::Rate => None,
+    };
+    samples.truncate(before);
+    if let (None, Some(sensor)) = (&class, &head.sensor)
+        && sensor.starts_with("android.")
+        && !sensor.contains("gyro")
+    {
+        return Err(Fault::new(
+            "other_sensor",
+            format!("`{sensor}` brings no body rate; it is passed over"),
+        ));
+    }
+    match class.as_deref() {
+        Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
+        // What a source says of itself is no request.
+        Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
+        Some("WATCH") => watch(line).map(Message::Watch),
+        Some("POLL") => Ok(Message::Poll),
+        Some("RESET") => Ok(Message::Reset(resetting::read(line))),
+        Some("PLAYBACK") => playback_action(line).map(Message::Playback),
+        Some("ATT") if head.id.as_deref() == Some(TRUTH) => {
+            reference::read(line).map(|found| Message::Reference(Box::new(found)))
+        }
+        Some("AUTH") => {
+            object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")
+                .map(|auth| Message::Auth(auth.token))
+        }
+        Some(other) => Err(Fault::new(
+            "unknown_class",
+            format!(
+                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, RESET, PLAYBACK, AUTH"
+            ),
+        )),
+        None => Err(Fault::new(
+            "no_rate",
+            "the line holds no body rate and no class; expected like {\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}",
+        )),
+    }
+}
+
+fn object<'a, T: Deserialize<'a>>(
+    line: &'a [u8],
+    code: &'static str,
+    expected: &str,
+) -> Result<T, Fault> {
+    serde_json::from_slice(line).map_err(|why| {
+        let what = why.to_string();
+        // Its line is the first of one: the caller knows which of all it is.
+        let what = what.split(" at line ").next().unwrap_or_default();
+        Fault {
+            column: Some(why.column() as u64),
+            ..Fault::new(code, format!("{}; expected {expected}", printable(what)))
+        }
+    })
+}
+
+fn playback_action(line: &[u8]) -> Result<Action, Fault> {
+    let bad = |message: String| Fault::new("bad_playback", message);
+    let asked: PlaybackObject = object(
+        line,
+        "bad_playback",
+        "like {\"class\":\"PLAYBACK\",\"action\":\"seek\",\"at\":{\"sec\":1,\"nsec\":0}}",
+    )?;
+    match (asked.action.as_str(), asked.at, asked.speed) {
+        ("play", ..) => Ok(Action::Play),
+        ("pause", ..) => Ok(Action::Pause),
+        ("seek", Some(at), _) => Ok(Action::Seek(Nanos::from_sec_nanosec(at.sec, at.nsec))),
+        ("speed", _, Some(speed)) => Ok(Action::Speed(speed)),
+        ("seek", None, _) => Err(bad("seek needs `at`: {\"sec\":1,\"nsec\":0}".to_owned())),
+        ("speed", _, None) => Err(bad("`speed` is missing: a factor such as 2.0".to_owned())),
+        (other, ..) => Err(bad(format!(
+            "there is no action `{}`; there are: play, pause, seek, speed",
+            printable(other)
+        ))),
+    }
+}
+
+fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
+    let bad = |message: String| Fault::new("bad_watch", message);
+    let asked: WatchObject = object(
+        line,
+        "bad_watch",
+        "like {\"class\":\"WATCH\",\"enable\":true,\"streams\":[\"ATT\"],\"ids\":[\"imu0\"],\"rate_hz\":50}",
+    )?;
+    let classes = asked.streams.as_ref().map(|names| {
+        names
+            .iter()
+            .map(|name| {
+                [Stream::Att, Stream::Rate]
+                    .into_iter()
+                    .find(|class| class.name() == name)
+                    .ok_or_else(|| {
+                        bad(format!(
+                            "there is no stream `{}`; there is: ATT, and RATE where a simulation is served",
+                            printable(name)
+                        ))
+                    })
+            })
+            .collect::<Result<_, _>>()
+    });
+    let classes = classes.transpose()?;
+    if let Some(rate_hz) = asked.rate_hz
+        && crate::sink::Decimator::new(rate_hz).is_none()
+    {
+        return Err(bad(format!("rate_hz {rate_hz} is not a rate above 0")));
+    }
+    let ids = asked.ids.or(asked.id);
+    if let Some(Ids::Several(ids)) = &ids
+        && ids.len() > MAX_WATCHED
+    {
+        return Err(bad(format!(
+            "{} ids; at most {MAX_WATCHED} can be named, and a WATCH without `ids` is for all sensors",
+            ids.len()
+        )));
+    }
+    let nothing = asked.streams.as_ref().is_some_and(Vec::is_empty);
+    let ids = match ids {
+        None => None,
+        Some(Ids::One(id)) => Some([name(&id)?].into()),
+        Some(Ids::Several(ids)) => Some(ids.iter().map(|id| name(id)).collect::<Result<_, _>>()?),
+    };
+    Ok((asked.enable && !nothing).then_some(Filter {
+        classes,
+        ids,
+        rate_hz: asked.rate_hz,
+        form: if asked.packed {
+            Form::Packed
+        } else {
+            Form::Lines
+        },
+        last: asked.last,
+    }))
+}
+
+/// A sensor's name, as a line gives it.
+fn name(text: &str) -> Result<String, Fault> {
+    exact_name(text).map_err(|why| undecodable(&why))
+}
+
+/// The fault of a line that cannot be decoded.
+#[must_use]
+pub fn undecodable(why: &Undecodable) -> Fault {
+    match why {
+        Undecodable::Json { offset, what } => Fault {
+            column: Some(offset + 1),
+            ..Fault::new("bad_json", format!("{what}, at column {}", offset + 1))
+        },
+        Undecodable::LongLine { .. } => too_long(),
+        Undecodable::Name { .. } => Fault::new("bad_id", why.to_string()),
+        other => Fault::new("undecodable", other.to_string()),
+    }
+}
+
+/// The fault of a line that is too long.
+#[must_use]
+pub fn too_long() -> Fault {
+    Fault::new(
+        "line_too_long",
+        format!("a line of more than {MAX_LINE} bytes; it is skipped up to its end"),
+    )
+}
+
+/// The fault of samples where none are taken.
+#[must_use]
+pub fn samples_not_taken() -> Fault {
+    Fault::new(
+        "samples_not_taken",
+        "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
+    )
+}
+
+/// The fault of a conversation that does not begin with an object, but like `beginning`.
+#[must_use]
+pub fn no_object(beginning: &[u8], takes_samples: bool) -> Fault {
+    let what = match beginning {
+        _ if is_http(beginning) => "this is HTTP",
+        [0x16, 0x03, ..] => "this is TLS, which is not spoken here",
+        [b'[', ..] => "the first line is an array, which only later ones may be",
+        _ => "the first line is no JSON object",
+    };
+    let where_to = if takes_samples {
+        "samples by HTTP go to POST /samples at a ws-listen:// address (http://127.0.0.1:8765/samples unless --listen says otherwise)"
+    } else {
+        "HTTP is answered at a ws-listen:// address"
+    };
+    Fault::new(
+        "not_an_object",
+        format!("{what}; a connection begins with one JSON object on a line; {where_to}"),
+    )
+}
+
+/// Whether a request of HTTP begins so: a method, and where to.
+fn is_http(beginning: &[u8]) -> bool {
+    let method = beginning.iter().take_while(|b| b.is_ascii_uppercase());
+    let letters = method.count();
+    letters > 0 && beginning.get(letters) == Some(&b' ')
+}
+
+fn line(value: &Value) -> Bytes {
+    let mut text = value.to_string();
+    text.push('\n');
+    text.into()
+}
+
+/// The greeting.
+#[must_use]
+pub fn version(session: &str) -> Bytes {
+    line(&json!({
+        "class": "VERSION", "proto": PROTO, "release": env!("CARGO_PKG_VERSION"),
+        "session": session, "max_line": MAX_LINE,
+    }))
+}
+
+/// The answer to `WATCH`.
+#[must_use]
+pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
+    let mut answer = json!({"class": "WATCH", "enable": filter.is_some()});
+    if let (Some(filter), Some(fields)) = (filter, answer.as_object_mut()) {
+        let wanted = |class: &&Stream| filter.classes.as_ref().is_none_or(|c| c.contains(*class));
+        let names: Vec<_> = offered.iter().filter(wanted).map(|c| c.name()).collect();
+        fields.insert("streams".into(), json!(names));
+        fields.insert("queue_bytes".into(), json!(MAX_QUEUED));
+        fields.insert("policy".into(), json!("drop_oldest"));
+        if let Some(ids) = &filter.ids {
+            fields.insert("ids".into(), json!(ids));
+        }
+        if let Some(rate_hz) = filter.rate_hz {
+            fields.insert("rate_hz".into(), json!(rate_hz));
+        }
+        if filter.form == Form::Packed {
+            fields.insert("packed".into(), json!(true));
+        }
+        if !filter.last {
+            fields.insert("last".into(), json!(false));
+        }
+    }
+    line(&answer)
+}
+
+/// A notice to a client, which is no fault.
+#[must_use]
+pub fn note(what: &Fault) -> Bytes {
+    line(&json!({"class": "NOTE", "code": what.code, "id": what.id, "message": what.message}))
+}
+
+/// The question whether a watcher that has ended its side is still there, after so long without anything to send: its
+/// system answers with a reset if it is not.
+#[must_use]
+pub fn heartbeat(quiet: Duration) -> Bytes {
+    note(&Fault::new(
+        "heartbeat",
+        format!(
+            "nothing to send for {} s; you have ended your side, and this line finds out whether you still read",
+            quiet.as_secs_f64()
+        ),
+    ))
+}
+
+/// The notice that attitudes of `id` were dropped.
+#[must_use]
+pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
+    line(&json!({
+        "class": "GAP", "id": id, "dropped": dropped.count,
+        "first_seq": dropped.first_seq, "last_seq": dropped.last_seq,
+    }))
+}
+
+/// Line of where a replay is.
+#[must_use]
+pub fn playback(place: &Position, session: &str) -> Bytes {
+    let stamp = |at: Option<Nanos>| {
+        at.map(|at| {
+            let (sec, nsec) = at.to_sec_nanosec();
+            json!({"sec": sec, "nsec": nsec})
+        })
+    };
+    line(&json!({
+        "class": "PLAYBACK", "state": place.mode.name(), "at": stamp(place.at),
+        "start": stamp(place.start), "end": stamp(place.end), "speed": place.speed,
+        "file": place.file, "session": session,
+    }))
+}
+
+/// The state; `fields` are those of the hub.
+#[must_use]
+pub fn status(fields: Value) -> Bytes {
+    let mut fields = fields;
+    if let Some(object) = fields.as_object_mut() {
+        object.insert("class".into(), json!("STATUS"));
+    }
+    line(&fields)
+}
+
+/// Line of a fault: of line `number` (0 = none), which begins like `near`; `suppressed` more were
+/// not said since the last.
+#[must_use]
+pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes {
+    line(&error_object(fault, number, near, suppressed))
+}
+
+/// The same as an object.
+pub(in crate::serve) fn error_object(
+    fault: &Fault,
+    number: u64,
+    near: &[u8],
+    suppressed: u64,
+) -> Value {
+    let mut answer = json!({"class": "ERROR", "code": fault.code, "message": fault.message});
+    if let Some(fields) = answer.as_object_mut() {
+        if let Some(id) = &fault.id {
+            fields.insert("id".into(), json!(id));
+        }
+        if number > 0 {
+            fields.insert("line".into(), json!(number));
+        }
+        if let Some(column) = fault.column {
+            fields.insert("column".into(), json!(column));
+        }
+        if !near.is_empty() {
+            fields.insert("near".into(), json!(snippet(near)));
+        }
+        if suppressed > 0 {
+            fields.insert("suppressed".into(), json!(suppressed));
+        }
+    }
+    answer
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn ask(text: &str) -> Result<Message, Fault> {
+        let mut samples = Vec::new();
+        let read = read(
+            &LineDecoder::default(),
+            text.as_bytes(),
+            Nanos(7),
+            &mut samples,
+        );
+        let is_sample = matches!(read, Ok(Message::Samples(_)));
+        assert_eq!(is_sample, !samples.is_empty(), "{text}: {samples:?}");
+        read
+    }
+
+    #[test]
+    fn a_line_is_a_sample_or_a_request_or_a_fault() {
+        for text in [
+            r#"{"class":"RATE","gyro":[1,2,3],"stamp":{"sec":1,"nsec":0}}"#,
+            r#"{"class":"RATE","gyro":null}"#,
+            r#"{"gyro":[1,2,3]}"#,
+            r#"{"class":"IMU","gyro_x":1,"gyro_y":2,"gyro_z":3}"#,
+        ] {
+            assert!(matches!(ask(text), Ok(Message::Samples(_))), "{text}");
+        }
+        assert_eq!(ask(r#"{"class":"POLL"}"#), Ok(Message::Poll));
+        assert_eq!(
+            ask(r#"{"class":"AUTH","token":"x"}"#),
+            Ok(Message::Auth("x".to_owned()))
+        );
+        for (text, code) in [
+            (
+                r#"{"class":"ATT","rate":[1,2,3],"q":{"w":1,"x":0,"y":0,"z":0}}"#,
+                "unknown_class",
+            ),
+            (r#"{"class":"EXEC"}"#, "unknown_class"),
+            (r#"{"a":1}"#, "no_rate"),
+            (r#"{"class":"AUTH"}"#, "bad_auth"),
+            (r#"{"class":"PLAYBACK"}"#, "bad_playback"),
+            (r#"{"class":"PLAYBACK","action":"stop"}"#, "bad_playback"),
+            (r#"{"class":"PLAYBACK","action":"seek"}"#, "bad_playback"),
+            (
+                r#"{"class":"PLAYBACK","action":"seek","at":1}"#,
+                "bad_playback",
+            ),
+            (
+                r#"{"class":"PLAYBACK","action":"speed","speed":"2"}"#,
+                "bad_playback",
+            ),
+            (r#"{"class":"WATCH","streams":["POSE"]}"#, "bad_watch"),
+            (r#"{"class":"WATCH","rate_hz":0}"#, "bad_watch"),
+            (r#"{"class":"WATCH","rate_hz":"fast"}"#, "bad_watch"),
+            (&watching_ids(5000), "bad_watch"),
+            (&watching_ids(MAX_WATCHED + 1), "bad_watch"),
+            ("nonsense", "bad_json"),
+        ] {
+            assert_eq!(ask(text).unwrap_err().code, code, "{text}");
+        }
+    }
+
+    fn watching_ids(n: usize) -> String {
+        let ids: Vec<String> = (0..n).map(|n| format!("\"{n}\"")).collect();
+        format!(r#"{{"class":"WATCH","ids":[{}]}}"#, ids.join(","))
+    }
+
+    #[test]
+    fn who_begins_with_no_object_hears_what_it_speaks_and_where_samples_go_by_http() {
+        for (begins, what) in [
+            ("POST / HTTP/1.1\r\n", "this is HTTP"),
+            ("OPTIONS * HTTP/1.1", "this is HTTP"),
+            ("\x16\x03\x01\x02", "this is TLS"),
+            ("[{\"gyro\":[1,2,3]}]", "an array"),
+            ("GET", "no JSON object"),
+            (" ", "no JSON object"),
+            ("", "no JSON object"),
+        ] {
+            let fault = no_object(begins.as_bytes(), true);
+            assert!(fault.message.contains(what), "{begins}: {fault:?}");
+            assert!(fault.message.contains("POST /samples"), "{fault:?}");
+            let of_replay = no_object(begins.as_bytes(), false);
+            assert!(!of_replay.message.contains("samples"), "{of_replay:?}");
+        }
+    }
+
+    #[test]
+    fn playback_is_asked_for_by_name() {
+        for (text, action) in [
+            (r#""action":"play""#, Action::Play),
+            (r#""action":"pause","x":1"#, Action::Pause),
+            (
+                r#""action":"seek","at":{"sec":-1,"nsec":999999999}"#,
+                Action::Seek(Nanos(-1)),
+            ),
+            (r#""action":"speed","speed":2"#, Action::Speed(2.0)),
+        ] {
+            let text = format!("{{\"class\":\"PLAYBACK\",{text}}}");
+            assert_eq!(ask(&text), Ok(Message::Playback(action)), "{text}");
+        }
+    }
+
+    #[test]
+    fn watch_names_sensors_and_rate_and_can_be_ended() {
+        let filter = |text: &str| match ask(text) {
+            Ok(Message::Watch(filter)) => filter,
+            other => unreachable!("{other:?}"),
+        };
+        let all = Filter {
+            last: true,
+            ..Filter::default()
+        };
+        assert_eq!(filter(r#"{"class":"WATCH"}"#), Some(all.clone()));
+        assert_eq!(
+            filter(r#"{"class":"WATCH","last":false}"#),
+            Some(Filter::default())
+        );
+        assert_eq!(filter(r#"{"class":"WATCH","enable":false}"#), None);
+        assert_eq!(filter(r#"{"class":"WATCH","streams":[]}"#), None);
+        let most = filter(&watching_ids(MAX_WATCHED)).and_then(|f| f.ids);
+        assert_eq!(most.map(|ids| ids.len()), Some(MAX_WATCHED));
+        assert_eq!(
+            filter(r#"{"class":"WATCH","id":"a","rate_hz":50,"from":"now","x":[]}"#),
+            Some(Filter {
+                ids: Some(["a".to_owned()].into()),
+                rate_hz: Some(50.0),
+                ..all
+            })
+        );
+    }
+
+    #[test]
+    fn packed_is_asked_for_and_the_answer_repeats_it_and_only_then() {
+        for (asked, form) in [("true", Form::Packed), ("false", Form::Lines)] {
+            let text = format!("{{\"class\":\"WATCH\",\"packed\":{asked}}}");
+            let Ok(Message::Watch(Some(filter))) = ask(&text) else {
+                unreachable!("{text}");
+            };
+            assert_eq!(filter.form, form);
+            let answer: Value =
+                serde_json::from_slice(&watching(Some(&filter), &[Stream::Att])).unwrap();
+            let is_packed = form == Form::Packed;
+            assert_eq!(
+                answer.get("packed"),
+                is_packed.then_some(&Value::Bool(true))
+            );
+        }
+        assert_eq!(
+            ask(r#"{"class":"WATCH","packed":1}"#).unwrap_err().code,
+            "bad_watch"
+        );
+    }
+
+    #[test]
+    fn a_fault_names_its_line_and_column_and_repeats_little_of_it() {
+        let bad = b"{\"class\":\"RATE\" \"gyro\":1}\x1b[31m";
+        let mut none = Vec::new();
+        let fault = read(&LineDecoder::default(), bad, Nanos(0), &mut none).unwrap_err();
+        let said: Value = serde_json::from_slice(&error(&fault, 42, bad, 3)).unwrap();
+        assert_eq!(said["class"], "ERROR");
+        assert_eq!(said["code"], "bad_json");
+        assert_eq!(said["line"], 42);
+        assert_eq!(said["column"], 17);
+        assert_eq!(said["suppressed"], 3);
+        assert!(!said["near"].as_str().unwrap().contains('\x1b'));
+        for hostile in [
+            vec![0x1b; 70_000],
+            vec![0xff; 100],
+            "é\u{202e}".repeat(99).into_bytes(),
+        ] {
+            assert!(snippet(&hostile).len() <= strapd_recording::text::MAX_NEAR);
+        }
+    }
+}
