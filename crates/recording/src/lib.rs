@@ -60,6 +60,7 @@ pub mod elsewhere;
 pub mod error;
 pub mod format;
 mod gpmf;
+pub mod json_fault;
 pub mod lines;
 mod mavlink;
 pub mod mcap;

@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, IsTerminal, Read, Write};
 use std::path::PathBuf;
+use strapd_recording::json_fault::JsonFault;
 
 /// Longest request that is read: a composite of some thousand bodies.
 const LONGEST: u64 = 1 << 20;
@@ -146,10 +147,8 @@ fn request<R: DeserializeOwned>(line: &[u8]) -> std::result::Result<R, String> {
         return Err("column 1: a request is one JSON object".to_owned());
     }
     serde_json::from_slice(line).map_err(|e| {
-        // A request is one line: which one is said by the caller.
-        let text = e.to_string();
-        let what = text.split(" at line ").next().unwrap_or(&text);
-        format!("column {}: {what}", e.column())
+        let JsonFault { what, column } = e.into();
+        format!("column {column}: {what}")
     })
 }
 

@@ -14,6 +14,7 @@ use frames::{BINARY, TEXT, TRANSFORMS, framed, unsigned};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use strapd_attitude::record::Nanos;
+use strapd_recording::json_fault::JsonFault;
 use strapd_recording::text::printable;
 
 /// The sub-protocols: that of the SDK, and the one before it.
@@ -53,11 +54,8 @@ struct Subscription {
 /// # Errors
 /// What to answer with, in words.
 pub fn read_text(text: &[u8]) -> Result<Request, String> {
-    let request: TextRequest = serde_json::from_slice(text).map_err(|why| {
-        let what = why.to_string();
-        let what = printable(what.split(" at line ").next().unwrap_or_default());
-        format!("no request: {what}")
-    })?;
+    let request: TextRequest = serde_json::from_slice(text)
+        .map_err(|why| format!("no request: {}", JsonFault::from(why).what))?;
     match (
         request.op.as_str(),
         request.subscriptions,

@@ -23,6 +23,7 @@ use std::time::Duration;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::packed::Form;
 use strapd_recording::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name};
+use strapd_recording::json_fault::JsonFault;
 use strapd_recording::text::{printable, snippet};
 
 /// The name of a sensor that gives none.
@@ -200,12 +201,10 @@ fn object<'a, T: Deserialize<'a>>(
     expected: &str,
 ) -> Result<T, Fault> {
     serde_json::from_slice(line).map_err(|why| {
-        let what = why.to_string();
-        // Its line is the first of one: the caller knows which of all it is.
-        let what = what.split(" at line ").next().unwrap_or_default();
+        let JsonFault { what, column } = why.into();
         Fault {
-            column: Some(why.column() as u64),
-            ..Fault::new(code, format!("{}; expected {expected}", printable(what)))
+            column: Some(column),
+            ..Fault::new(code, format!("{what}; expected {expected}"))
         }
     })
 }

@@ -3,6 +3,7 @@
 //! Apart from the other lines because it holds no sample: what it says holds for objects that come after it.
 
 use crate::decode::{Class, GyroUnit, Line, Undecodable, exact_name};
+use crate::json_fault::JsonFault;
 use crate::text::printable;
 use serde::Deserialize;
 use strapd_attitude::record::SampleKind;
@@ -49,13 +50,8 @@ pub enum Unbound {
 /// [`Unbound`].
 pub fn binding(line: &[u8]) -> Result<(u32, Line), Unbound> {
     let said: PackedObject = serde_json::from_slice(line).map_err(|why| {
-        let what = why.to_string();
-        // Its line is the first of one: who reads lines knows which of all it is.
-        let what = what.split(" at line ").next().unwrap_or_default();
-        Unbound::Object {
-            what: printable(what),
-            column: why.column() as u64,
-        }
+        let JsonFault { what, column } = why.into();
+        Unbound::Object { what, column }
     })?;
     let kinds = SampleKind::ALL.map(|kind| (kind.name(), kind));
     let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|unit| (unit.name(), unit));
