@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 use std::time::{Duration, Instant};
 use strapd_attitude::estimate::Aid;
 use strapd_replay::pipeline::samples::{Stop, estimate as run};
+use strapd_replay::summary::TopicSummary;
 
 /// Longest wait for Ctrl-C, beside the samples between two looks.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -39,15 +40,18 @@ impl Signals {
     }
 }
 
-/// Attitudes, the summary as JSON, its warnings, the sigma of the bias that was removed beforehand, and the
-/// calibration.
-type Estimated<'py> = (
-    Bound<'py, PyDict>,
-    String,
-    Vec<String>,
-    [f64; 3],
-    Bound<'py, PyDict>,
-);
+/// Summary as JSON, its warnings with arguments in the place of flags, and the calibration.
+pub type Outcome<'py> = (String, Vec<String>, Bound<'py, PyDict>);
+
+/// Makes the outcome of a summary.
+pub fn outcome<'py>(py: Python<'py>, summary: &TopicSummary) -> PyResult<Outcome<'py>> {
+    let warnings = summary.warnings();
+    Ok((
+        summary.json().to_string(),
+        warnings.iter().map(|w| refusal::in_python(w)).collect(),
+        calibration::write(py, &summary.calibration)?,
+    ))
+}
 
 /// Attitudes of samples that are all there, and what became of them.
 #[pyfunction]
@@ -62,7 +66,7 @@ pub fn estimate<'py>(
     orientation: Option<Rows<'py>>,
     dt: Option<Times<'py>>,
     settings: &Bound<'py, PyDict>,
-) -> PyResult<Estimated<'py>> {
+) -> PyResult<(Bound<'py, PyDict>, Outcome<'py>)> {
     let plan = settings::plan(settings, Aid::Auto)?;
     let samples = Samples::new(
         &gyr,
@@ -84,12 +88,5 @@ pub fn estimate<'py>(
         Stop::Refused(what) => refusal::run(py, "refused", what),
         Stop::Ended(error) => error,
     })?;
-    let warnings = done.summary.warnings();
-    Ok((
-        columns.into_dict(py)?,
-        done.summary.json().to_string(),
-        warnings.iter().map(|w| refusal::in_python(w)).collect(),
-        done.bias_sigma,
-        calibration::write(py, &done.calibration)?,
-    ))
+    Ok((columns.into_dict(py)?, outcome(py, &done)?))
 }

@@ -11,7 +11,6 @@
 //! | [`columns`] | attitudes -> columns -> numpy arrays over their memory |
 //! | [`batch`] | all samples at once -> attitudes |
 //! | [`live`] | samples as they come -> attitudes |
-//! | [`facts`] | what is known of a live estimator -> a dict |
 //! | [`calibration`] | the calibration of a sensor <-> a dict |
 //! | [`compared`] | two attitudes -> how far apart |
 //! | [`words`] | the command's flags -> a replay to be done |
@@ -30,7 +29,6 @@ mod calibration;
 mod columns;
 mod compared;
 mod errand;
-mod facts;
 mod live;
 mod looked;
 mod noted;

@@ -2,9 +2,8 @@
 //!
 //! Begins as the daemon does: by its first sample alone, since its attitude must not wait.
 
-use crate::batch::Signals;
+use crate::batch::{Outcome, Signals, outcome};
 use crate::columns::Columns;
-use crate::facts;
 use crate::refusal::{self, argument};
 use crate::samples::{Rows, Samples, Times, sample};
 use crate::settings;
@@ -14,6 +13,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Estimator, Meaning, Plan, Prepared, at_once};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, Nanos, RawSample};
+use strapd_replay::pipeline::samples::so_far;
 
 /// Samples between two looks for Ctrl-C.
 const BLOCK: usize = 4096;
@@ -31,6 +31,8 @@ pub struct Live {
     /// Samples a second, where stamps are counted.
     rate_hz: Option<f64>,
     taken: u64,
+    /// Attitudes that were given.
+    given: u64,
     is_closed: bool,
 }
 
@@ -130,6 +132,7 @@ impl Live {
             last: None,
             rate_hz,
             taken: 0,
+            given: 0,
             is_closed: false,
         })
     }
@@ -153,8 +156,10 @@ impl Live {
             .running(&raw)
             .map_err(|what| refusal::run(py, "refused", what))?;
         estimator.take(&raw);
-        let newest = estimator.attitudes(&Sequential).last().copied();
+        let known = estimator.attitudes(&Sequential);
+        let (newest, given) = (known.last().copied(), known.len() as u64);
         self.last = newest.or(self.last);
+        self.given += given;
         Ok(newest.map(|newest| {
             let [w, x, y, z] = newest.q_nb.wxyz();
             (newest.stamp.0, (w, x, y, z))
@@ -180,7 +185,7 @@ impl Live {
                 .map_err(|what| refusal::run(py, "refused", what))?;
         }
         self.taken += samples.len() as u64;
-        let (running, last) = (&mut self.running, &mut self.last);
+        let (running, last, given) = (&mut self.running, &mut self.last, &mut self.given);
         let mut signals = Signals::new();
         py.detach(|| {
             let Some((estimator, _)) = running else {
@@ -192,6 +197,7 @@ impl Live {
                 }
                 let known = estimator.attitudes(&Sequential);
                 *last = known.last().copied().or(*last);
+                *given += known.len() as u64;
                 columns.extend(known);
                 signals.look()?;
             }
@@ -208,6 +214,7 @@ impl Live {
         if let Some((estimator, _)) = &mut self.running {
             let rest = estimator.finish(&Sequential);
             self.last = rest.last().copied().or(self.last);
+            self.given += rest.len() as u64;
             columns.extend(&rest);
         }
         columns.into_dict(py)
@@ -220,13 +227,13 @@ impl Live {
     }
 
     /// Outcome of the samples so far; `None` before the first.
-    fn facts<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        self.running
-            .as_ref()
-            .map(|(estimator, prepared)| {
-                facts::of(py, &self.plan, &self.meaning, prepared, estimator)
-            })
-            .transpose()
+    fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Option<Outcome<'py>>> {
+        let Some((estimator, prepared)) = &self.running else {
+            return Ok(None);
+        };
+        let of = (&self.plan, &self.meaning, prepared);
+        let summary = so_far(of, estimator, self.given, self.last.as_ref());
+        outcome(py, &summary).map(Some)
     }
 
     /// The newest attitude as columns of one row, or none.

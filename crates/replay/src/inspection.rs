@@ -10,6 +10,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
 use strapd_attitude::record::{Counts, RawSample};
 use strapd_recording::MadeBefore;
+use strapd_recording::format::Format;
 use strapd_recording::recording::beside::TopicOfVectors;
 
 /// One topic of samples, looked at.
@@ -21,6 +22,8 @@ pub struct Inspection {
     pub of: String,
     /// Type and encoding.
     pub described: String,
+    /// Format of the recording.
+    pub format: Format,
     /// The frame its first message names.
     pub frame: String,
     /// Meaning of its samples by default.

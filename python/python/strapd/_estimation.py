@@ -96,6 +96,12 @@ def tell_smoothing(summary: dict[str, Any], depth: int) -> None:
             warnings.warn(finding["what"], SmoothingWarning, stacklevel=depth)
 
 
+def _summary(outcome: tuple[str, list[str], dict[str, Any]]) -> dict[str, Any]:
+    """The summary as a replay has it, with the calibration; of flags its warnings make arguments."""
+    answer, warned, calibration = outcome
+    return {**json.loads(answer), "warnings": warned, "calibration": calibration}
+
+
 def _run(
     gyr: npt.ArrayLike,
     t: Optional[npt.ArrayLike],
@@ -108,7 +114,7 @@ def _run(
     rates = _inputs.rates(gyr)
     n = rates.shape[0]
     acc, mag, orientation = beside
-    columns, answer, said, bias_sigma, calibration = _strapd.estimate(
+    columns, outcome = _strapd.estimate(
         rates,
         _inputs.stamps(t, rate_hz, n),
         _optional("acc", acc, n),
@@ -117,8 +123,7 @@ def _run(
         None if dt is None else _inputs.intervals(dt, n),
         _ready(settings),
     )
-    # As a replay says it; its arguments are those of this function.
-    summary: dict[str, Any] = {**json.loads(answer), "warnings": said, "bias_sigma_rad_s": bias_sigma, "calibration": calibration}
+    summary = _summary(outcome)
     tell(loss(summary), strict, depth=4)
     tell_smoothing(summary, depth=4)
     return Attitude(columns, summary)
@@ -252,4 +257,5 @@ class Estimator(_strapd.Live):
     @property
     def summary(self) -> dict[str, Any]:
         """What became of the samples so far; empty before the first."""
-        return self.facts() or {}
+        outcome = self.outcome()
+        return {} if outcome is None else _summary(outcome)

@@ -1,16 +1,19 @@
 //! One topic -> its part of the page. Pure.
 
 use super::charts::{self, Time};
-use super::markup::{Rows, escaped, figure, sentence, table};
+use super::markup::{Rows, escaped, figure, table};
 use super::{Noise, Page, numbers, reference, timeline};
 use crate::report::aid::Aided;
 use crate::report::series::Drawn;
 use crate::report::smoothing::Smoothing;
-use crate::report::summary::{TopicSummary, meaning, significant};
+use crate::report::summary::{TopicSummary, significant};
 use std::fmt::Write as _;
-use strapd_attitude::record::Verdict;
 use strapd_replay::inspection::CheckedTopic;
 
+/// Keys of the rows about gaps and bad samples, which have a part of the page to themselves.
+const LOST: [&str; 2] = ["gaps", "first_losses"];
+/// Key of the row about the reference, of which a part of the page says more.
+const AGAINST: &str = "against_recorded";
 /// Rests and cuts told one by one.
 const TOLD: usize = 12;
 
@@ -26,12 +29,13 @@ pub(super) fn section(
         "<section class=\"topic\"><h2>{}</h2>",
         escaped(&topic.looked.topic)
     );
+    let is_damaged = page.checked.file_losses > 0;
     match &topic.replayed {
         Err(why) => {
             let why = why.line();
             let _ = writeln!(out, "<p>No attitude could be had: {}.</p>", escaped(&why));
         }
-        Ok(summary) => integrated(summary, stretches, out),
+        Ok(summary) => integrated(summary, is_damaged, stretches, out),
     }
     let drawn = topic
         .replayed
@@ -40,8 +44,11 @@ pub(super) fn section(
         .and_then(|s| s.drawn.as_deref())
         .filter(|d| d.series.samples > 0);
     out.push_str("<h3>Gaps, bad samples and resets</h3>\n");
+    if let Ok(summary) = &topic.replayed {
+        out.push_str(&facts(summary, is_damaged, |key| LOST.contains(&key)));
+    }
     match drawn {
-        Some(drawn) => lost(topic, drawn, stretches, out),
+        Some(drawn) => timeline(topic, drawn, stretches, out),
         None => {
             out.push_str("<p>Without an attitude there is no axis of time to draw them on.</p>\n")
         }
@@ -72,62 +79,21 @@ fn lines(text: &str) -> String {
     text.lines().map(escaped).collect::<Vec<_>>().join("\n")
 }
 
-fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
-    let mut rows = Rows::default();
-    let rate = s
-        .rate_hz
-        .map_or_else(String::new, |hz| format!(" at {} Hz", significant(hz, 5)));
-    rows.add(
-        "samples",
-        &format!(
-            "{} in, {} used; {:.3} s{rate}, {} clock",
-            s.counts.total(),
-            s.counts.used(),
-            s.duration_secs,
-            s.clock
-        ),
-    );
-    let lost: Vec<String> = Verdict::ALL
-        .iter()
-        .filter(|v| **v != Verdict::Accepted && s.counts.get(**v) > 0)
-        .map(|v| format!("{} {}", s.counts.get(*v), v.name().replace('_', " ")))
-        .chain(s.first_losses.iter().cloned())
-        .collect();
-    if !lost.is_empty() {
-        rows.add("not plainly used", &lost.join("; "));
+/// The rows of a summary under the keys that are wanted, as a table.
+fn facts(s: &TopicSummary, is_damaged: bool, is_wanted: impl Fn(&str) -> bool) -> String {
+    let mut table = Rows::default();
+    for row in s.rows(is_damaged).iter().filter(|row| is_wanted(row.key())) {
+        for (label, line) in row.lines() {
+            table.add(label, line);
+        }
     }
-    rows.add("method", &format!("{}; {}", s.method, meaning(s.kind)));
-    rows.add(
-        "frames",
-        &format!(
-            "input {} to body {} to world {}; initial attitude: {}",
-            s.input_axes, s.body, s.world, s.initial
-        ),
-    );
-    let [x, y, z] = s.bias;
-    rows.add(
-        "bias removed",
-        &if s.bias == [0.0; 3] {
-            s.bias_origin.clone()
-        } else {
-            format!("({x:.6}, {y:.6}, {z:.6}) rad/s, {}", s.bias_origin)
-        },
-    );
-    rows.add(
-        "turned",
-        &format!(
-            "{:.1} deg in all, at most {:.3} deg in one step",
-            s.turned.to_degrees(),
-            s.largest_step.to_degrees()
-        ),
-    );
-    if s.has_attitude() {
-        at_the_end(s, &mut rows);
-    }
-    for warning in s.warnings() {
-        rows.add("warning", &warning);
-    }
-    out.push_str(&rows.html());
+    table.html()
+}
+
+fn integrated(s: &TopicSummary, is_damaged: bool, stretches: Option<usize>, out: &mut String) {
+    out.push_str(&facts(s, is_damaged, |key| {
+        !LOST.contains(&key) && key != AGAINST
+    }));
     if let Some(smoothing) = s.smoothing() {
         smoothed(smoothing, s.drawn.as_deref(), out);
     } else if let Some(learned) = s.aided.as_ref().and_then(Aided::learned) {
@@ -144,31 +110,11 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
     }
 }
 
-/// The last attitude, and how well it is known.
-fn at_the_end(s: &TopicSummary, rows: &mut Rows) {
-    let [yaw, pitch, roll] = s.final_ypr.map(f64::to_degrees);
-    let sigma = s.final_sigma.into_iter().fold(0.0, f64::max).to_degrees();
-    rows.add(
-        "at the end",
-        &format!(
-            "roll {roll:.3}, pitch {pitch:.3}, yaw {yaw:.3} deg, one sigma of {} deg at most; {}",
-            significant(sigma, 2),
-            s.drift_text()
-        ),
-    );
-    if let Some(terms) = &s.sigma_terms {
-        rows.add("sigma", &terms.text());
-    }
-}
-
 /// Adds what the whole recording told of the sensor, and what that is worth.
 fn smoothed(smoothing: &Smoothing, drawn: Option<&Drawn>, out: &mut String) {
     out.push_str("<h3>Calibration by the whole recording</h3>\n");
     out.push_str(&table("numbers", &Smoothing::HEAD, &smoothing.learned()));
     out.push_str("<p class=\"small\">One sigma, after and before. What the motion does not show stays near nothing, with the sigma it had: it is not observed. Axes are small turns: xy is how far x reads y.</p>\n");
-    for line in smoothing.lines().iter().skip(1) {
-        let _ = writeln!(out, "<p>{}.</p>", sentence(&escaped(line)));
-    }
     let Some(drawn) = drawn else { return };
     for (id, chart) in charts::sizes(smoothing.sizes(), drawn) {
         out.push_str(&figure(id, chart));
@@ -237,28 +183,7 @@ fn plots(s: &TopicSummary, drawn: &Drawn, stretches: usize, out: &mut String) {
     }
 }
 
-fn lost(topic: &CheckedTopic, drawn: &Drawn, stretches: Option<usize>, out: &mut String) {
-    let Ok(s) = &topic.replayed else { return };
-    let gaps = s.gaps;
-    let count = gaps.bridged + gaps.held + gaps.resets;
-    let said = if count == 0 {
-        "No gap.".to_owned()
-    } else {
-        format!(
-            "{count} gaps: {} bridged, {} held, {} reset; {:.3} s in all, the longest {:.3} s at {:.3} s.",
-            gaps.bridged,
-            gaps.held,
-            gaps.resets,
-            gaps.total_secs,
-            gaps.longest_secs,
-            gaps.longest_at_secs
-        )
-    };
-    let bad = match s.counts.lost() {
-        0 => " No sample was lost.".to_owned(),
-        n => format!(" {n} of {} samples were lost.", s.counts.total()),
-    };
-    let _ = writeln!(out, "<p>{said}{bad}</p>");
+fn timeline(topic: &CheckedTopic, drawn: &Drawn, stretches: Option<usize>, out: &mut String) {
     if stretches.is_some()
         && let Some(svg) = timeline::strips(drawn, &topic.looked.rests, Time::of(drawn))
     {

@@ -137,6 +137,7 @@ impl TextLog {
             messages: channels.iter().map(|(known, _)| known.messages).sum(),
             ..Survey::default()
         };
+        survey.facts.format = input.format();
         for times in channels.iter().filter_map(|(_, times)| *times) {
             survey.times = Some(spanning(survey.times, times));
         }

@@ -12,7 +12,6 @@ use strapd_attitude::setting::{
     AGAINST_RECORDED, BIAS, BODY, COLUMNS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP,
     MOUNT, ON_GAP, RATE_HZ, REGULARISE_STAMPS, TIME,
 };
-use strapd_recording::format::Format;
 
 /// Header and recorder's clock further apart than this are different clocks, s.
 const OTHER_CLOCK_SECS: f64 = 1.0;
@@ -286,10 +285,7 @@ fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Findi
         );
     }
     // Of a table the columns say it.
-    let is_table = [Format::Table, Format::Parquet]
-        .iter()
-        .any(|format| looked.described.ends_with(&format!("[{}]", format.name())));
-    match is_table {
+    match looked.format.is_table() {
         true => found
             .advise("so gravity cannot correct the attitude: say the unit")
             .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),

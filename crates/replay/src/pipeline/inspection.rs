@@ -1,7 +1,6 @@
 //! A log's topics of samples -> how good they are: statistics, rests, clocks. I/O.
 //!
-//! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
-//! anyone leaps.
+//! Apart from the replay because it integrates nothing: `info` and `check` look before anyone leaps.
 
 use crate::error::{Error, Result};
 use crate::inspection::{Aids, Inspection};
@@ -17,6 +16,7 @@ use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
 use strapd_recording::decode::{self, Options};
+use strapd_recording::format::Format;
 use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::Vectors;
@@ -43,6 +43,7 @@ struct Look {
     topic: String,
     of: String,
     described: String,
+    format: Format,
     frame: String,
     kind_stated: bool,
     resolved: Meaning,
@@ -141,6 +142,7 @@ impl Look {
             topic: self.topic,
             of: self.of,
             described: self.described,
+            format: self.format,
             frame: self.frame,
             resolved: self.resolved,
             kind_stated: self.kind_stated,
@@ -205,7 +207,8 @@ pub(crate) fn look_as(
                 }
             };
             let stream = *begun.get_or_insert_with(|| {
-                looks.push(begin(source, known, &decoder, plan));
+                let format = log.survey.facts.format;
+                looks.push(begin(source, known, (&decoder, format), plan));
                 looks.len() - 1
             });
             let (_, takers) = decoders
@@ -322,7 +325,12 @@ fn wanted<'l>(
     )
 }
 
-fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan: &Plan) -> Look {
+fn begin(
+    source: &Publisher,
+    known: &LogChannel,
+    (decoder, format): (&decode::Decoder, Format),
+    plan: &Plan,
+) -> Look {
     let resolved = Meaning::new(plan, &decoder.stated().declared);
     let first_frame = || {
         let (_, payload) = known.first.as_ref()?;
@@ -332,6 +340,7 @@ fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan
         topic: source.name.clone(),
         of: source.topic.clone(),
         described: described(&known.channel),
+        format,
         frame: source
             .frame
             .clone()

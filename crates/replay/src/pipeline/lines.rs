@@ -44,9 +44,11 @@ pub(super) fn replay(
         pool,
         watch,
     };
+    let mut survey = Survey::default();
+    survey.facts.format = input.format();
     read(wanted(run), input, &path, &mut running)?;
     let ended = running.waiting.into_session(pool)?.finish(run, pool)?;
-    Ok(summarise::run(run, ended, &Survey::default()))
+    Ok(summarise::run(run, ended, &survey))
 }
 
 /// Reads a file of lines as far as is needed to know how it begins, as any other file; `None` where it holds no sensor.

@@ -8,17 +8,21 @@ use super::request::ReplayRequest;
 use super::session::{Found, Topic};
 use super::summarise;
 use crate::error::Error;
+use crate::findings::of_sensor;
 use crate::summary::TopicSummary;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Meaning, Patience, Plan, SensorCalibration, learned};
+use strapd_attitude::estimate::{Estimator, Meaning, Patience, Plan, Prepared, learned};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, RawSample};
 use strapd_recording::Source;
+use strapd_recording::format::Format;
 
 /// The name of samples that have none.
 const NAME: &str = "samples";
+/// Their type and encoding.
+const DESCRIBED: &str = "arrays";
 /// Samples between two looks at whether to go on.
 const BLOCK: usize = 4096;
 
@@ -41,17 +45,6 @@ impl<E> From<Error> for Stop<E> {
     }
 }
 
-/// Result of an estimate of samples.
-#[derive(Debug)]
-pub struct Estimated {
-    /// The numbers and the words of a replay.
-    pub summary: TopicSummary,
-    /// Uncertainty of the bias that was removed beforehand, rad/s, body axes.
-    pub bias_sigma: [f64; 3],
-    /// Calibration of the sensor at the end, without a name.
-    pub calibration: SensorCalibration,
-}
-
 /// Attitudes of `samples` as `plan` asks for, given to `take` as they are made; every few thousand samples it is asked
 /// whether to go on, with no attitudes where there are none yet.
 ///
@@ -61,7 +54,7 @@ pub fn estimate<E>(
     plan: &Plan,
     samples: impl Iterator<Item = RawSample> + Clone,
     mut take: impl FnMut(&[AttitudeSample]) -> Result<(), E>,
-) -> Result<Estimated, Stop<E>> {
+) -> Result<TopicSummary, Stop<E>> {
     let path = Path::new(NAME);
     let run = ReplayRequest {
         plan: plan.clone(),
@@ -70,7 +63,7 @@ pub fn estimate<E>(
     let found = Found {
         name: NAME.to_owned(),
         output_topic: String::new(),
-        described: "arrays".to_owned(),
+        described: DESCRIBED.to_owned(),
         resolved: Meaning::new(plan, &Declared::default()),
         noticed: Arc::default(),
         warnings: Vec::new(),
@@ -117,14 +110,38 @@ pub fn estimate<E>(
     });
     ended.map_err(Stop::Ended)?;
     finished?;
-    let known = learned(
-        (plan, &topic.resolved, &topic.prepared),
-        topic.estimator.filter(),
-        topic.estimator.smoothed().and_then(Result::ok),
-    );
-    Ok(Estimated {
-        summary: summarise::of_topic(&run, &mut topic),
-        bias_sigma: topic.prepared.bias_sigma.into(),
-        calibration: known,
+    let summary = summarise::of_topic(&run, &mut topic, Format::default());
+    Ok(TopicSummary {
+        // Without the name that the samples have not.
+        calibration: learned(
+            (plan, &topic.resolved, &topic.prepared),
+            topic.estimator.filter(),
+            topic.estimator.smoothed().and_then(Result::ok),
+        ),
+        ..summary
     })
+}
+
+/// The same of an estimator whose samples still come, under the same names: what it knows now. It has given `written`
+/// attitudes, of which `last` is the newest.
+#[must_use]
+pub fn so_far(
+    of: (&Plan, &Meaning, &Prepared),
+    estimator: &Estimator,
+    written: u64,
+    last: Option<&AttitudeSample>,
+) -> TopicSummary {
+    let mut summary = TopicSummary {
+        topic: NAME.to_owned(),
+        decoded_as: DESCRIBED.to_owned(),
+        written,
+        ..TopicSummary::of(of, estimator, last)
+    };
+    let (report, propagation) = (estimator.conditioning(), estimator.propagation());
+    let found = of_sensor(report, &propagation, &summary.clock);
+    summary.findings.extend(found);
+    for finding in &mut summary.findings {
+        finding.topic.clone_from(&summary.topic);
+    }
+    summary
 }

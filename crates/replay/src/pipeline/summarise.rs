@@ -5,23 +5,15 @@ use super::request::ReplayRequest;
 use super::sample_kinds::AgainstRecorded;
 use super::session::{Ended, Topic};
 use super::unmet::{FieldWatch, unmet};
-use crate::finding::{Finding, Severity};
 use crate::findings;
-use crate::summary::aid::Aided;
 use crate::summary::calibration;
 use crate::summary::series::Drawn;
-use crate::summary::sigma::SigmaTerms;
-use crate::summary::smoothing::Smoothing;
-use crate::summary::stamps::{Regularised, Segment};
-use crate::summary::{Gaps, RunSummary, TopicSummary};
+use crate::summary::{RunSummary, TopicSummary, warning};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use strapd_attitude::condition::regularise;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{SensorCalibration, learned};
-use strapd_attitude::propagate::Method;
-use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{Nanos, SampleKind, Verdict};
+use strapd_attitude::estimate::SensorCalibration;
+use strapd_attitude::record::Verdict;
 use strapd_recording::Source;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
@@ -37,7 +29,7 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
         source: run.source.name().display().to_string(),
         topics: topics
             .iter_mut()
-            .map(|topic| of_topic(run, topic))
+            .map(|topic| of_topic(run, topic, survey.facts.format))
             .collect(),
         broken: broken(&outputs),
         reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
@@ -60,104 +52,38 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
 /// Summary of a topic, or the reason why there is none.
 pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
 
-/// Summaries of the topics of a run without outputs, or why one has not what was asked for.
-pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<Told> {
+/// Summaries of the topics of a run over a recording of `format`, without outputs, or why one has not what was asked
+/// for.
+pub(super) fn topics(run: &ReplayRequest, ended: Ended, format: Format) -> Vec<Told> {
     let told = |mut topic: Topic| match unmet(&run.plan, &topic) {
         Some(what) => Err(what),
-        None => Ok(Box::new(of_topic(run, &mut topic))),
+        None => Ok(Box::new(of_topic(run, &mut topic, format))),
     };
     ended.topics.into_iter().map(told).collect()
 }
 
-/// Summary of one topic.
-pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
+/// Summary of one topic of a recording of `format`.
+pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic, format: Format) -> TopicSummary {
     let drawn = drawn(topic);
-    let conditioning = topic.estimator.conditioning();
-    let propagation = topic.estimator.propagation();
-    let (world, body) = topic.resolved.labels(topic.prepared.world);
-    let last = topic.output.last;
-    let q = last.map_or_else(Quaternion::identity, |s| s.q_nb);
-    let angles = q.yaw_pitch_roll();
-    let gaps = &conditioning.gaps;
-    let first = conditioning.first.unwrap_or_default();
-    let recording = topic.estimator.smoothed().and_then(Result::ok);
-    let smoothed = topic.estimator.smoothed().map(|result| {
-        let result = result.map(Smoothing::of);
-        result.map_err(Diagnostic::clone)
-    });
+    let of = (&run.plan, &topic.resolved, &topic.prepared);
     let mut summary = TopicSummary {
         topic: topic.name.clone(),
         output_topic: topic.output_topic.clone(),
         decoded_as: topic.described.clone(),
-        counts: conditioning.counts,
         left_out: topic.noticed.left_out().iter().map(|(_, n)| n).sum(),
-        first_losses: first_losses(topic, first),
+        first_losses: first_losses(topic, format),
         written: topic.output.count,
-        duration_secs: conditioning.duration_nanos() as f64 * 1e-9,
-        span: conditioning.first.zip(conditioning.last),
         rate_hz: topic.output.rate_hz(),
-        clock: topic.prepared.clock.name().to_owned(),
-        stamps: topic
-            .estimator
-            .regularising()
-            .map(|(causal, report)| regularised(causal, &report, first)),
-        kind: match recording {
-            Some(recording) if recording.is_taken_as_mean => SampleKind::Average,
-            _ => topic.resolved.kind,
-        },
-        method: match &smoothed {
-            Some(Ok(smoothing)) => smoothing.method(),
-            _ => method_words(topic),
-        },
-        body,
-        world,
-        initial: topic.prepared.initial_origin.clone(),
-        latitude_deg: run.plan.latitude_deg,
-        bias: topic.prepared.bias.into(),
-        bias_origin: topic.prepared.bias_origin.clone(),
-        aided: topic.estimator.filter().map(Aided::of),
-        smoothed,
-        calibration: calibrated(run, topic),
-        noise: run.plan.noise.name.clone(),
-        sigma_terms: recording.is_none().then(|| {
-            SigmaTerms::of(
-                &run.plan,
-                &topic.prepared,
-                gaps.count.saturating_sub(gaps.not_bridged),
-            )
-        }),
-        drift: drift(run, topic, propagation.integrated_secs),
-        // Of what runs along with a smoother it would be another attitude's.
-        integration_error: propagation
-            .integration_error
-            .filter(|_| recording.is_none()),
-        input_axes: topic.resolved.body.to_string(),
-        gaps: Gaps::of(conditioning, &propagation),
-        turned: propagation.angle_turned,
-        largest_step: propagation.largest_step,
-        undersampled: propagation.undersampled,
-        final_wxyz: q.wxyz(),
-        final_ypr: [angles.yaw, angles.pitch, angles.roll],
-        final_sigma: last.map_or([0.0; 3], |s| s.covariance.sigma().into()),
         against: topic
             .against
             .as_ref()
             .map(AgainstRecorded::rows)
             .unwrap_or_default(),
         recorded: topic.against.as_ref().and_then(AgainstRecorded::recorded),
-        findings: Vec::new(),
         drawn,
+        ..TopicSummary::of(of, &topic.estimator, topic.output.last.as_ref())
     };
-    let said = topic.prepared.warnings.iter().chain(&topic.warnings);
-    summary.findings = said
-        .map(|said| {
-            Finding::said(
-                Severity::Warning,
-                said.code().unwrap_or("preparation"),
-                said,
-            )
-        })
-        .collect();
+    summary.findings.extend(topic.warnings.iter().map(warning));
     let found = findings::of_run(
         &summary,
         &findings::Noted {
@@ -172,18 +98,15 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         },
     );
     summary.findings.extend(found);
+    summary.calibration = calibrated(run, topic, summary.calibration);
     for finding in &mut summary.findings {
         finding.topic.clone_from(&summary.topic);
     }
     summary
 }
 
-/// Calibration of the sensor at the end.
-fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
-    let filter = topic.estimator.filter();
-    let recording = topic.estimator.smoothed().and_then(Result::ok);
-    let of = (&run.plan, &topic.resolved, &topic.prepared);
-    let known = learned(of, filter, recording);
+/// Calibration of the sensor at the end, with whose it is and from where.
+fn calibrated(run: &ReplayRequest, topic: &Topic, known: SensorCalibration) -> SensorCalibration {
     let source = match &run.source {
         Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
         Source::Parts(paths) => parts_named(paths).into(),
@@ -220,51 +143,9 @@ fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
     Some(Box::new(drawn))
 }
 
-/// Uncertainty of the bias at the end, about the worst axis, rad/s: what was not known at the start,
-/// and what it has wandered since.
-fn drift(run: &ReplayRequest, topic: &Topic, secs: f64) -> f64 {
-    topic
-        .prepared
-        .bias_sigma
-        .iter()
-        .zip(run.plan.noise.rrw)
-        .map(|(bias, rrw)| bias.hypot(rrw * secs.sqrt()))
-        .fold(0.0, f64::max)
-}
-
-fn regularised(causal: bool, report: &regularise::Report, first: Nanos) -> Regularised {
-    Regularised {
-        causal,
-        segments: report.segments,
-        kept: report
-            .kept
-            .iter()
-            .map(|s| Segment {
-                from_secs: s.start.secs_since(first),
-                samples: s.samples,
-                rate_hz: s.rate_hz,
-            })
-            .collect(),
-        rms_nanos: report.rms_nanos,
-        p99_nanos: report.p99_nanos,
-        max_nanos: report.max_nanos,
-        jitter: report.jitter,
-        ambiguous: report.ambiguous,
-        uneven: report.is_uneven(),
-    }
-}
-
-/// The method, `auto` with what it stands for.
-fn method_words(topic: &Topic) -> String {
-    match (topic.estimator.method(), topic.resolved.kind) {
-        (Method::Auto, SampleKind::Rate) => "auto: centred window of 16 samples, exact".to_owned(),
-        (Method::Auto, _) => "auto: centred window of 15 increments, exact".to_owned(),
-        (other, _) => other.to_string(),
-    }
-}
-
-fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
+fn first_losses(topic: &Topic, format: Format) -> Vec<String> {
     let report = topic.estimator.conditioning();
+    let start = report.first.unwrap_or_default();
     let mut said: Vec<String> = Verdict::ALL
         .iter()
         .filter(|v| v.is_loss() && **v != Verdict::Undecodable)
@@ -283,20 +164,12 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
         })
         .collect();
     if let Some((log, why)) = &topic.first_undecodable {
-        said.push(if is_text(&topic.described) {
+        // Where others carry a time, lines and rows carry their number.
+        said.push(if format.is_text() {
             format!("first undecodable, line {}: {why}", log.0)
         } else {
             format!("first undecodable, logged at {} ns: {why}", log.0)
         });
     }
     said
-}
-
-/// Whether it was read from lines or rows: their undecodable payloads carry the line's number where others carry a
-/// time.
-fn is_text(described: &str) -> bool {
-    [Format::Lines, Format::Table, Format::Parquet]
-        .iter()
-        .map(|format| format.name())
-        .any(|name| described == name || described.ends_with(&format!("[{name}]")))
 }

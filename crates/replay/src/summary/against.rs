@@ -2,10 +2,46 @@
 //!
 //! Apart from the summary because `compare`, `check` and the page say the same.
 
-use super::{Recorded, significant};
+use super::significant;
 use serde_json::{Value, json};
-use strapd_attitude::compare::{Align, BiasFit, Consistency, WithinSigma};
+use strapd_attitude::compare::{Align, BiasFit, BodyAxesFit, Consistency, WithinSigma};
 use strapd_attitude::setting::{BIAS, Choice};
+
+/// Error against a recorded orientation for one meaning of a sample.
+#[derive(Clone, Debug)]
+pub struct Against {
+    /// `rate`, `average` or `held`.
+    pub kind: &'static str,
+    /// Meaning of the kind.
+    pub meaning: &'static str,
+    /// Median of the error of the rotation over 1 s, deg.
+    pub median_deg: f64,
+    /// 95th percentile of it, deg.
+    pub p95_deg: f64,
+    /// Pairs compared.
+    pub pairs: usize,
+}
+
+/// A recorded orientation that was compared with.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Recorded {
+    /// Recorded attitudes that are rotations (a long log's are thinned).
+    pub usable: usize,
+    /// Recorded quadruples that are none: norm far from 1, zero, NaN.
+    pub unusable: u64,
+    /// All of them are one and the same.
+    pub constant: bool,
+    /// Axes of its body relative to the gyro's; `None` = the motion does not tell.
+    pub axes: Option<BodyAxesFit>,
+    /// Whether the run's errors lie within what it said of them; `None` = no instant in common, or no sigma.
+    pub consistency: Option<Consistency>,
+    /// The bias by which the gyro alone leaves it.
+    pub bias: Option<BiasFit>,
+    /// The bias that was removed before, rad/s.
+    pub removed: [f64; 3],
+    /// Resets by its source: errors are those of the parts between, each aligned by itself.
+    pub resets: usize,
+}
 
 /// A share in percent: never 100 where one is outside.
 fn percent(share: f64) -> String {
@@ -123,9 +159,46 @@ pub fn bias_json(fit: &BiasFit) -> Value {
     })
 }
 
+impl Against {
+    /// JSON for machines: one object a row.
+    pub(super) fn json(rows: &[Against]) -> Value {
+        let row = |a: &Against| {
+            json!({
+                "kind": a.kind, "median_deg": a.median_deg, "p95_deg": a.p95_deg, "pairs": a.pairs,
+            })
+        };
+        rows.iter().map(row).collect()
+    }
+
+    fn text(&self, best: f64) -> String {
+        let mark = match self.median_deg == best {
+            true => "  <- best",
+            false => "",
+        };
+        format!(
+            "{:<8} {:>8.3} / {:<8.3} {}{mark}",
+            self.kind, self.median_deg, self.p95_deg, self.meaning
+        )
+    }
+}
+
+/// Lines for people about the orientation that was compared with; none where none was.
+pub(super) fn against_text(rows: &[Against], recorded: Option<&Recorded>) -> Vec<String> {
+    if rows.is_empty() {
+        return Vec::new();
+    }
+    let medians = rows.iter().map(|a| a.median_deg);
+    let best = medians.fold(f64::INFINITY, f64::min);
+    let head = "the recorded orientation: error of the rotation over 1 s, median / 95 %, deg";
+    std::iter::once(head.to_owned())
+        .chain(rows.iter().map(|row| row.text(best)))
+        .chain(recorded.into_iter().flat_map(Recorded::words))
+        .collect()
+}
+
 impl Recorded {
     /// Lines for people: its resets, and the share of the errors within sigma.
-    pub(super) fn words(&self) -> impl Iterator<Item = String> {
+    fn words(&self) -> impl Iterator<Item = String> {
         let sigma = self.consistency.as_ref().map(within_sigma);
         resets(self.resets).into_iter().chain(sigma)
     }

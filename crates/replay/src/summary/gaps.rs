@@ -1,5 +1,6 @@
-//! Gaps and clock jumps of a run -> numbers and words. Pure.
+//! Gaps and clock jumps of a run -> numbers, words, JSON. Pure.
 
+use serde_json::{Value, json};
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
 use strapd_attitude::{condition, propagate};
 
@@ -157,5 +158,20 @@ impl Gaps {
             text += &format!("; {back}");
         }
         text
+    }
+    /// JSON for machines.
+    pub(super) fn json(&self) -> Value {
+        json!({
+            "bridged": self.bridged,
+            "held": self.held,
+            "resets": self.resets,
+            "total_s": self.total_secs,
+            "not_integrated_s": self.held_secs,
+            "longest_s": self.longest_secs,
+            "longest_at_s": self.longest_at_secs,
+            "jumps_back": self.jumps_back,
+            "farthest_back_s": self.farthest_back_secs,
+            "farthest_back_at_s": self.farthest_back_at_secs,
+        })
     }
 }

@@ -2,6 +2,8 @@
 
 use super::significant;
 use serde_json::{Value, json};
+use strapd_attitude::condition::regularise;
+use strapd_attitude::record::Nanos;
 
 /// Segments written out for people.
 const SAID: usize = 5;
@@ -41,6 +43,30 @@ pub struct Segment {
 }
 
 impl Regularised {
+    /// Makes it of what was found; `first` is the first stamp of all.
+    #[must_use]
+    pub fn of(causal: bool, report: &regularise::Report, first: Nanos) -> Regularised {
+        Regularised {
+            causal,
+            segments: report.segments,
+            kept: report
+                .kept
+                .iter()
+                .map(|s| Segment {
+                    from_secs: s.start.secs_since(first),
+                    samples: s.samples,
+                    rate_hz: s.rate_hz,
+                })
+                .collect(),
+            rms_nanos: report.rms_nanos,
+            p99_nanos: report.p99_nanos,
+            max_nanos: report.max_nanos,
+            jitter: report.jitter,
+            ambiguous: report.ambiguous,
+            uneven: report.is_uneven(),
+        }
+    }
+
     /// Text for people.
     #[must_use]
     pub fn text(&self) -> String {

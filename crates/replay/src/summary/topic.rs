@@ -1,0 +1,492 @@
+//! An estimator as it is now -> the summary of its topic, and its rows. Pure.
+//!
+//! A figure of an estimator stands in this file alone: a field, what it is taken from, and its row, of which text,
+//! JSON, page and Python are made.
+
+use super::against::{Against, Recorded, against_text};
+use super::aid::Aided;
+use super::gaps::Gaps;
+use super::rows::{self, Row};
+use super::series::Drawn;
+use super::sigma::SigmaTerms;
+use super::smoothing::Smoothing;
+use super::stamps::Regularised;
+use super::{meaning, significant};
+use crate::finding::{Finding, Severity};
+use serde_json::{Map, Value, json};
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, SensorCalibration, learned};
+use strapd_attitude::propagate::Method;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeSample, Counts, Nanos, SampleKind, Verdict};
+use strapd_attitude::setting::AID;
+use strapd_attitude::worlds::EARTH_RATE;
+
+/// Summary of one topic: of a log, or of samples that still come.
+#[derive(Clone, Debug, Default)]
+pub struct TopicSummary {
+    /// Topic of the samples.
+    pub topic: String,
+    /// Topic of the attitude.
+    pub output_topic: String,
+    /// Message type and encoding, as found.
+    pub decoded_as: String,
+    /// Outcome of every sample.
+    pub counts: Counts,
+    /// Messages of another body, by the frame they name, that nobody asked to leave out.
+    pub left_out: u64,
+    /// The first sample of each verdict that is a loss, explained.
+    pub first_losses: Vec<String>,
+    /// Attitudes written.
+    pub written: u64,
+    /// First to last stamp, s.
+    pub duration_secs: f64,
+    /// The first and the last stamp.
+    pub span: Option<(Nanos, Nanos)>,
+    /// Median sample rate, Hz.
+    pub rate_hz: Option<f64>,
+    /// The clock the samples were placed on.
+    pub clock: String,
+    /// Outcome of the stamps, if `--regularise-stamps` asked for it.
+    pub stamps: Option<Regularised>,
+    /// Kind for which a sample was taken.
+    pub kind: SampleKind,
+    /// The integrator in words.
+    pub method: String,
+    /// Axes of the recorded numbers.
+    pub input_axes: String,
+    /// Axes of the body.
+    pub body: String,
+    /// World of the attitude.
+    pub world: String,
+    /// Origin of the initial attitude.
+    pub initial: String,
+    /// Latitude for which the Earth's rotation was taken out, deg.
+    pub latitude_deg: Option<f64>,
+    /// Bias removed, rad/s, body axes.
+    pub bias: [f64; 3],
+    /// Uncertainty of the bias removed, rad/s, body axes.
+    pub bias_sigma: [f64; 3],
+    /// Origin of the bias, with its sigma if it was estimated.
+    pub bias_origin: String,
+    /// Account of what corrected the attitude, if something did.
+    pub aided: Option<Aided>,
+    /// Result of a smoother, if one was asked for, or why there is none: then the attitude is that of `aided`.
+    pub smoothed: Option<Result<Smoothing, Diagnostic>>,
+    /// Calibration of the sensor at the end.
+    pub calibration: SensorCalibration,
+    /// Noise behind sigma.
+    pub noise: String,
+    /// Terms of sigma.
+    pub sigma_terms: Option<SigmaTerms>,
+    /// Drift to be expected from what is not known of the bias, rad/s.
+    pub drift: f64,
+    /// Bound on the worst attitude error of the integration itself, rad; `None` where the method cannot tell.
+    pub integration_error: Option<f64>,
+    /// Gaps.
+    pub gaps: Gaps,
+    /// Sum of the angles of all steps, rad.
+    pub turned: f64,
+    /// Largest angle of one step, rad.
+    pub largest_step: f64,
+    /// Steps of more than half a turn.
+    pub undersampled: u64,
+    /// Last attitude `[w, x, y, z]`.
+    pub final_wxyz: [f64; 4],
+    /// Final yaw, pitch, roll, rad.
+    pub final_ypr: [f64; 3],
+    /// One standard deviation about each body axis at the end, rad.
+    pub final_sigma: [f64; 3],
+    /// Comparisons with the recorded orientation, one row per sample kind.
+    pub against: Vec<Against>,
+    /// Description of the recorded orientation itself, if one was compared with.
+    pub recorded: Option<Recorded>,
+    /// Things to know, each with the flag that helps.
+    pub findings: Vec<Finding>,
+    /// Series to draw, if a report asked for them.
+    pub drawn: Option<Box<Drawn>>,
+}
+
+impl TopicSummary {
+    /// Summary of what `estimator` knows now; `last` is its newest attitude. Names, outputs and what else a run knows of
+    /// a topic are left empty.
+    #[must_use]
+    pub fn of(
+        (plan, resolved, prepared): (&Plan, &Meaning, &Prepared),
+        estimator: &Estimator,
+        last: Option<&AttitudeSample>,
+    ) -> TopicSummary {
+        let conditioning = estimator.conditioning();
+        let propagation = estimator.propagation();
+        let (world, body) = resolved.labels(prepared.world);
+        let q = last.map_or_else(Quaternion::identity, |s| s.q_nb);
+        let angles = q.yaw_pitch_roll();
+        let first = conditioning.first.unwrap_or_default();
+        let recording = estimator.smoothed().and_then(Result::ok);
+        let smoothed = estimator.smoothed().map(|result| {
+            let result = result.map(Smoothing::of);
+            result.map_err(Diagnostic::clone)
+        });
+        let gaps = Gaps::of(conditioning, &propagation);
+        TopicSummary {
+            counts: conditioning.counts,
+            duration_secs: conditioning.duration_nanos() as f64 * 1e-9,
+            span: conditioning.first.zip(conditioning.last),
+            rate_hz: conditioning
+                .spacing_nanos
+                .filter(|n| *n > 0)
+                .map(|n| 1e9 / n as f64),
+            clock: prepared.clock.name().to_owned(),
+            stamps: estimator
+                .regularising()
+                .map(|(causal, report)| Regularised::of(causal, &report, first)),
+            kind: match recording {
+                Some(recording) if recording.is_taken_as_mean => SampleKind::Average,
+                _ => resolved.kind,
+            },
+            method: match &smoothed {
+                Some(Ok(smoothing)) => smoothing.method(),
+                _ => method_words(estimator.method(), resolved.kind),
+            },
+            body,
+            world,
+            initial: prepared.initial_origin.clone(),
+            latitude_deg: plan.latitude_deg,
+            bias: prepared.bias.into(),
+            bias_sigma: prepared.bias_sigma.into(),
+            bias_origin: prepared.bias_origin.clone(),
+            aided: estimator.filter().map(Aided::of),
+            smoothed,
+            calibration: learned((plan, resolved, prepared), estimator.filter(), recording),
+            noise: plan.noise.name.clone(),
+            sigma_terms: recording
+                .is_none()
+                .then(|| SigmaTerms::of(plan, prepared, gaps.bridged)),
+            drift: drift(plan, prepared, propagation.integrated_secs),
+            // Of what runs along with a smoother it would be another attitude's.
+            integration_error: propagation
+                .integration_error
+                .filter(|_| recording.is_none()),
+            input_axes: resolved.body.to_string(),
+            gaps,
+            turned: propagation.angle_turned,
+            largest_step: propagation.largest_step,
+            undersampled: propagation.undersampled,
+            final_wxyz: q.wxyz(),
+            final_ypr: [angles.yaw, angles.pitch, angles.roll],
+            final_sigma: last.map_or([0.0; 3], |s| s.covariance.sigma().into()),
+            findings: prepared.warnings.iter().map(warning).collect(),
+            ..TopicSummary::default()
+        }
+    }
+
+    /// Whether samples were lost, or time in which nothing is known.
+    #[must_use]
+    pub fn is_lossy(&self) -> bool {
+        self.counts.lost() + self.left_out > 0
+            || self.gaps.held + self.gaps.resets > 0
+            || !self.has_attitude()
+    }
+
+    /// Whether a sample was used, so that there is an attitude.
+    #[must_use]
+    pub fn has_attitude(&self) -> bool {
+        self.counts.used() > 0
+    }
+
+    /// All of it: in the order of the text, for people and machines. `is_damaged`: the file lost some of its data.
+    #[must_use]
+    pub fn rows(&self, is_damaged: bool) -> Vec<Row> {
+        // What is said of an attitude where there is one.
+        let seen = |line: String| self.has_attitude().then_some(line);
+        let (corrector, corrected) = self.correction();
+        let mut rows = vec![
+            Row::value("topic", self.topic.as_str()),
+            Row::value("output_topic", self.output_topic.as_str()),
+            Row::value("decoded_as", self.decoded_as.as_str()),
+            Row::value("samples", self.counts_json()).told("samples", [self.samples_text()]),
+            Row::value("left_out", self.left_out),
+            Row::value("written", self.written),
+            Row::value("duration_s", self.duration_secs),
+            Row::value("rate_hz", self.rate_hz),
+            Row::value("clock", self.clock.as_str()),
+            Row::value(
+                "regularised_stamps",
+                self.stamps.as_ref().map(Regularised::json),
+            )
+            .told("stamps", self.stamps.as_ref().map(Regularised::text)),
+            Row::value("sample_kind", self.kind.name()),
+            Row::value("method", self.method.as_str()).told(
+                "method",
+                [format!("{}; {}", self.method, meaning(self.kind))],
+            ),
+            Row::value("input_axes", self.input_axes.as_str()),
+            Row::value("body", self.body.as_str()),
+            Row::value("world", self.world.as_str()),
+            Row::value("initial", self.initial.as_str()).told("frames", [self.frames_text()]),
+            Row::value("smooth", self.smoothed.as_ref().map(smoothed_json))
+                .told("smooth", self.not_smoothed()),
+            Row::value("aid", self.aided.as_ref().map(Aided::json))
+                .told(corrector, corrected.into_iter().filter_map(seen)),
+            Row::value("bias_rad_s", self.bias_json()).told("bias", seen(self.bias_text())),
+            Row::value("bias_sigma_rad_s", self.bias_sigma.as_slice()),
+            Row::value("earth_rate", self.latitude_deg.map(earth_json))
+                .told("earth", self.latitude_deg.map(earth_text).and_then(seen)),
+            Row::angle("turned_deg", self.turned).told("turned", seen(self.turned_text())),
+            Row::angle("largest_step_deg", self.largest_step),
+            Row::value("undersampled_steps", self.undersampled),
+            Row::value("final", self.has_attitude().then(|| self.final_json()))
+                .told("final", [self.final_text()]),
+            Row::value("noise", self.noise.as_str()).told("sigma", seen(self.sigma_text())),
+            Row::value(
+                "sigma_terms",
+                self.sigma_terms.as_ref().map(SigmaTerms::json),
+            )
+            .told(
+                "",
+                self.sigma_terms
+                    .as_ref()
+                    .and_then(|terms| seen(terms.text())),
+            ),
+            Row::value("drift_deg_per_h", self.drift_deg_per_h()),
+            Row::angle("integration_error_deg", self.integration_error)
+                .told("numeric", seen(self.error_text())),
+            Row::value("gaps", self.gaps.json()).told("gaps", [self.gaps.text()]),
+            Row::value("first_losses", self.first_losses.as_slice()).told(
+                "lost",
+                std::iter::once(self.lost_text(is_damaged)).chain(self.first_losses.clone()),
+            ),
+            Row::value("against_recorded", Against::json(&self.against)).told(
+                "against",
+                against_text(&self.against, self.recorded.as_ref()),
+            ),
+            Row::value("recorded", self.recorded.as_ref().map(Recorded::json)),
+            Row::value("warnings", self.warnings()),
+            Row::value(
+                "findings",
+                self.findings.iter().map(Finding::json).collect::<Value>(),
+            ),
+        ];
+        rows.extend(
+            self.warnings()
+                .into_iter()
+                .map(|said| Row::words("warning", [said])),
+        );
+        rows
+    }
+
+    /// JSON for machines: one object.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        rows::json(self.rows(false))
+    }
+
+    /// Result of a smoother, if there is one.
+    #[must_use]
+    pub fn smoothing(&self) -> Option<&Smoothing> {
+        self.smoothed.as_ref()?.as_ref().ok()
+    }
+
+    /// Warning that a smoother was asked for and gave nothing.
+    #[must_use]
+    pub fn not_smoothed(&self) -> Option<String> {
+        let why = self.smoothed.as_ref()?.as_ref().err()?;
+        Some(format!(
+            "NOT SMOOTHED: {}; the attitude is the real-time filter's",
+            why.line()
+        ))
+    }
+
+    /// Warnings, a line each.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        self.findings.iter().map(Finding::line).collect()
+    }
+
+    /// Label and lines about what corrected the attitude.
+    fn correction(&self) -> (&'static str, Vec<String>) {
+        match (self.smoothing(), &self.aided) {
+            (Some(smoothing), _) => ("smooth", smoothing.lines()),
+            (None, Some(aided)) => ("aid", aided.lines()),
+            (None, None) => (
+                "aid",
+                vec![format!(
+                    "none: the gyro alone, which drifts ({AID} gravity corrects tilt by the accelerometer)"
+                )],
+            ),
+        }
+    }
+
+    fn samples_text(&self) -> String {
+        let rate = self
+            .rate_hz
+            .map_or_else(String::new, |hz| format!(" at {} Hz", significant(hz, 5)));
+        format!(
+            "{} in, {} used; {:.3} s{rate}, {} clock",
+            self.counts.total(),
+            self.counts.used(),
+            self.duration_secs,
+            self.clock
+        )
+    }
+
+    fn counts_json(&self) -> Value {
+        json!({
+            "total": self.counts.total(),
+            "used": self.counts.used(),
+            "lost": self.counts.lost(),
+            "by_verdict": Verdict::ALL.iter()
+                .map(|v| (v.name().to_owned(), json!(self.counts.get(*v))))
+                .collect::<Map<_, _>>(),
+        })
+    }
+
+    fn frames_text(&self) -> String {
+        format!(
+            "input {} -> body {} -> world {}; initial attitude: {}",
+            self.input_axes, self.body, self.world, self.initial
+        )
+    }
+
+    fn bias_text(&self) -> String {
+        if self.bias == [0.0; 3] {
+            return format!("{} removed", self.bias_origin);
+        }
+        let [x, y, z] = self.bias;
+        format!(
+            "({x:.6}, {y:.6}, {z:.6}) rad/s removed, {}",
+            self.bias_origin
+        )
+    }
+
+    fn bias_json(&self) -> Value {
+        let [x, y, z] = self.bias;
+        json!({ "x": x, "y": y, "z": z, "origin": self.bias_origin })
+    }
+
+    fn turned_text(&self) -> String {
+        format!(
+            "{:.1} deg in all, at most {:.3} deg in one step",
+            self.turned.to_degrees(),
+            self.largest_step.to_degrees()
+        )
+    }
+
+    fn final_text(&self) -> String {
+        if !self.has_attitude() {
+            return "no attitude: no sample was used".to_owned();
+        }
+        let [w, x, y, z] = self.final_wxyz;
+        let [yaw, pitch, roll] = self.final_ypr.map(f64::to_degrees);
+        format!(
+            "roll {roll:.3}  pitch {pitch:.3}  yaw {yaw:.3} deg   q w {w:.6}  x {x:.6}  y {y:.6}  z {z:.6}"
+        )
+    }
+
+    fn final_json(&self) -> Value {
+        let [w, x, y, z] = self.final_wxyz;
+        let [yaw, pitch, roll] = self.final_ypr.map(f64::to_degrees);
+        json!({
+            "q": { "w": w, "x": x, "y": y, "z": z },
+            "roll_deg": roll, "pitch_deg": pitch, "yaw_deg": yaw,
+            "sigma_deg": self.final_sigma.map(f64::to_degrees),
+        })
+    }
+
+    fn drift_deg_per_h(&self) -> f64 {
+        self.drift.to_degrees() * 3600.0
+    }
+
+    /// Text of the sigma at the end, and what it is of: that of what corrects the attitude, else of the drift.
+    fn sigma_text(&self) -> String {
+        let [x, y, z] = self.final_sigma.map(|v| significant(v.to_degrees(), 2));
+        let of = match (self.smoothing(), &self.aided) {
+            (Some(smoothing), _) => smoothing.sigma_text().to_owned(),
+            (None, Some(aided)) => aided.sigma_text().to_owned(),
+            (None, None) => format!(
+                "drift of about {} deg/h to be expected ({} noise)",
+                significant(self.drift_deg_per_h(), 2),
+                self.noise
+            ),
+        };
+        format!("{x}, {y}, {z} deg about x, y, z at the end; {of}")
+    }
+
+    fn error_text(&self) -> String {
+        self.integration_error.map_or_else(
+            || "integration error not estimated for this method".to_owned(),
+            |error| {
+                format!(
+                    "integration error at most about {} deg, by a window of four samples less{}",
+                    significant(error.to_degrees(), 2),
+                    self.gaps.not_in_the_error()
+                )
+            },
+        )
+    }
+
+    fn lost_text(&self, is_damaged: bool) -> String {
+        let parts: Vec<String> = Verdict::ALL
+            .iter()
+            .filter(|v| !matches!(v, Verdict::Accepted) && self.counts.get(**v) > 0)
+            .map(|v| format!("{} {}", self.counts.get(*v), v.name().replace('_', " ")))
+            .collect();
+        match (parts.is_empty(), is_damaged) {
+            (true, true) => "nothing of what could be read, but the file is damaged:".to_owned(),
+            (true, false) => "nothing".to_owned(),
+            _ => format!(
+                "{} of {} samples ({})",
+                self.counts.lost(),
+                self.counts.total(),
+                parts.join(", ")
+            ),
+        }
+    }
+}
+
+/// Finding of something that the preparation, or a run, noticed.
+pub(crate) fn warning(said: &Diagnostic) -> Finding {
+    Finding::said(
+        Severity::Warning,
+        said.code().unwrap_or("preparation"),
+        said,
+    )
+}
+
+fn smoothed_json(smoothed: &Result<Smoothing, Diagnostic>) -> Value {
+    match smoothed {
+        Ok(smoothing) => smoothing.json(),
+        Err(why) => json!({ "outcome": "filter", "why": why.to_string() }),
+    }
+}
+
+fn earth_json(latitude_deg: f64) -> Value {
+    json!({ "latitude_deg": latitude_deg, "rad_s": EARTH_RATE })
+}
+
+fn earth_text(latitude_deg: f64) -> String {
+    format!(
+        "rotation taken out for latitude {latitude_deg} deg, {:.3} deg/h; rates stay relative to inertial space",
+        EARTH_RATE.to_degrees() * 3600.0
+    )
+}
+
+/// Uncertainty of the bias after `secs`, about the worst axis, rad/s: what was not known at the start, and what it has
+/// wandered since.
+fn drift(plan: &Plan, prepared: &Prepared, secs: f64) -> f64 {
+    prepared
+        .bias_sigma
+        .iter()
+        .zip(plan.noise.rrw)
+        .map(|(bias, rrw)| bias.hypot(rrw * secs.sqrt()))
+        .fold(0.0, f64::max)
+}
+
+/// The method, `auto` with what it stands for.
+fn method_words(method: Method, kind: SampleKind) -> String {
+    match (method, kind) {
+        (Method::Auto, SampleKind::Rate) => "auto: centred window of 16 samples, exact".to_owned(),
+        (Method::Auto, _) => "auto: centred window of 15 increments, exact".to_owned(),
+        (other, _) => other.to_string(),
+    }
+}
