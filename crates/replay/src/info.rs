@@ -8,7 +8,6 @@ use crate::shell::{flag, quoted_file};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
-use strapd_attitude::condition::quality::Advice;
 use strapd_attitude::setting::{
     AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, GYRO_UNIT, INIT, JOIN, TOPIC,
 };
@@ -108,8 +107,7 @@ impl Overview<'_> {
             }
         };
         let mut help: Vec<Choice> = Vec::new();
-        let is_degrees = |a: &Advice| matches!(a, Advice::RatesLookLikeDegrees { .. });
-        if best.quality.advice.iter().any(is_degrees) {
+        if of_samples(best).iter().any(|f| f.code == "unit-degrees") {
             help.push(GYRO_UNIT.to("deg"));
         }
         if best.bias.is_some() {

@@ -3,20 +3,19 @@
 //! A stage of its own, beside the conditioner and before it, because advice about units, axes
 //! and clocks must come from the samples as they were recorded, before any setting was applied.
 
-mod advice;
 mod gravity;
 mod summary;
 
-pub use advice::Advice;
 pub use gravity::GyroAgainstGravity;
-pub use summary::{AxisStats, GravityAxis, OffsetStats, QualitySummary, SpacingStats};
+pub use summary::{AxisStats, GravityAxis, OffsetStats, SpacingStats};
 
 use super::clock::Clock;
 use super::histogram::Histogram;
+use super::regularise::{Lines, Uneven};
 use crate::record::{Nanos, RawSample};
-use advice::NEAR_ONE;
 use gravity::GravityTrack;
 use nalgebra::Vector3;
+use summary::{Axis, Offset};
 
 /// Samples from which the step is learnt that jitter is measured against.
 const PRIMING: usize = 64;
@@ -27,156 +26,113 @@ const WINDOW_SAMPLES: u64 = 8;
 /// it.
 pub const LONGEST_GAP_NANOS: i64 = 3_600_000_000_000;
 
+/// Above this no gyro is in rad/s (11,500 deg/s; the widest range sold is 4000 to 20,000 deg/s on
+/// single-axis spin sensors, 2000 to 4000 on three-axis ones).
+const DEGREES_ABOVE: f64 = 200.0;
+/// Lengths of one g in g, of a body that moves.
+const NEAR_ONE: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+
+/// Everything `info` prints about one topic. What is counted is counted here; what is computed of sums at the end is
+/// filled in by [`Quality::summary`].
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct QualitySummary {
+    /// Samples seen.
+    pub count: u64,
+    /// Samples without a stamp of the chosen clock.
+    pub no_stamp: u64,
+    /// First stamp, in order of arrival.
+    pub first: Option<Nanos>,
+    /// Newest stamp.
+    pub newest: Option<Nanos>,
+    /// Newest minus first, s.
+    pub duration_secs: f64,
+    /// Steps and jitter; `None` below two stamps that advance.
+    pub spacing: Option<SpacingStats>,
+    /// Deviations from the ordinary step: `from..to` in ns, by octave, and how many.
+    pub jitter: Vec<(f64, f64, u64)>,
+    /// Steps with samples missing.
+    pub gaps: u64,
+    /// Samples missing in them, by the ordinary step.
+    pub missing: u64,
+    /// The longest, s.
+    pub longest_gap_secs: f64,
+    /// Samples with their predecessor's stamp.
+    pub duplicates: u64,
+    /// Number of these with other data than it.
+    pub collisions: u64,
+    /// Samples older than one before them.
+    pub disorder: u64,
+    /// Header minus log time; `None` without header stamps.
+    pub offset: Option<OffsetStats>,
+    /// Samples without a gyro.
+    pub no_gyro: u64,
+    /// Samples with NaN or infinity in the gyro.
+    pub not_finite: u64,
+    /// Samples with a gyro of exactly (0, 0, 0).
+    pub zero_rows: u64,
+    /// Number of these, alone between two that are not.
+    pub lone_zero_rows: u64,
+    /// Samples with a rate that no gyro reaches in rad/s, below nonsense.
+    pub fast_rows: u64,
+    /// Samples with exactly their predecessor's gyro.
+    pub repeated_rows: u64,
+    /// x, y, z.
+    pub axes: [AxisStats; 3],
+    /// Samples with an acceleration.
+    pub with_accel: u64,
+    /// Number of these with NaN or infinity.
+    pub accel_not_finite: u64,
+    /// Number of these with a length of 0.8 to 1.25, as of gravity in g.
+    pub accel_near_one: u64,
+    /// Number of these with a length of 800 to 1250, as of gravity in mg.
+    pub accel_near_thousand: u64,
+    /// Samples with an orientation.
+    pub with_orientation: u64,
+    /// Whether any of these is another than the first: some drivers fill the field with one.
+    pub orientation_varies: bool,
+    /// Samples that state their own integration interval.
+    pub with_interval: u64,
+    /// Start of the quietest half second.
+    pub quietest_at: Option<Nanos>,
+    /// Largest gyro deviation in it, source's unit.
+    pub quietest_deviation: Option<f64>,
+    /// Mean rate in it, source's unit: the bias, if it is a rest.
+    pub quietest_rate: Option<Vector3<f64>>,
+    /// Magnitude of the mean acceleration in it, source's unit.
+    pub accel_at_rest: Option<f64>,
+    /// The axis that holds at least 0.8 of it.
+    pub gravity: Option<GravityAxis>,
+    /// Whether the gyro's unit and signs agree with the turning of gravity; `None` where gravity turned too little.
+    pub gyro_against_gravity: Option<GyroAgainstGravity>,
+    /// Straight lines through the stamps, where they were laid.
+    pub lines: Option<Result<Lines, Uneven>>,
+}
+
 /// Streaming statistics of one topic, in the units and axes of the source. Bounded memory (about
 /// 70 kB), and the same numbers however the samples come in blocks.
 #[derive(Clone, Debug)]
 pub struct Quality {
     clock: Clock,
-    count: u64,
-    no_stamp: u64,
-    first: Option<Nanos>,
+    /// Counts, in the place where they are read.
+    so_far: QualitySummary,
     last: Option<Nanos>,
-    high: Option<Nanos>,
     primer: Vec<i64>,
     nominal: Option<i64>,
     spacing: Histogram,
     jitter: Histogram,
-    duplicates: u64,
-    /// Number of these with other data.
-    collisions: u64,
     /// Different samples on the newest stamp.
     sharing: i64,
-    disorder: u64,
-    gaps: u64,
-    missing: u64,
     longest_gap: i64,
     /// The newest hole: between which stamps, and how many samples are still missing in it.
     hole: Option<(Nanos, Nanos, u64)>,
-    no_gyro: u64,
-    not_finite: u64,
-    zero_rows: u64,
-    /// Number of these between two that are not.
-    lone_zero_rows: u64,
     last_row_lone_zero: bool,
-    repeated_rows: u64,
-    /// Samples above [`advice::DEGREES_ABOVE`] and below nonsense.
-    fast_rows: u64,
     axes: [Axis; 3],
     previous: Option<[f64; 3]>,
-    accel_count: u64,
-    accel_not_finite: u64,
-    /// Number of lengths near 1, and near 1000.
-    near_one: u64,
-    near_thousand: u64,
-    orientations: u64,
     first_orientation: Option<[f64; 4]>,
-    orientation_varies: bool,
-    intervals: u64,
     offset: Offset,
     window: Window,
     gravity: GravityTrack,
     quietest: Option<Quiet>,
-}
-
-/// One gyro axis, over finite samples.
-#[derive(Clone, Copy, Debug)]
-struct Axis {
-    min: f64,
-    max: f64,
-    sum: f64,
-    sum_squares: f64,
-    count: u64,
-    /// Samples at the largest magnitude so far, the longest run of them while the other axes moved,
-    /// and the run under way.
-    at_peak: u64,
-    longest_at_peak: u64,
-    run_at_peak: u64,
-    peak: f64,
-    /// Samples in a row with this value, and the longest such run.
-    run: u64,
-    longest_run: u64,
-    last: f64,
-}
-
-impl Axis {
-    const EMPTY: Axis = Axis {
-        min: f64::INFINITY,
-        max: f64::NEG_INFINITY,
-        sum: 0.0,
-        sum_squares: 0.0,
-        count: 0,
-        at_peak: 0,
-        longest_at_peak: 0,
-        run_at_peak: 0,
-        peak: 0.0,
-        run: 0,
-        longest_run: 0,
-        last: f64::NAN,
-    };
-
-    /// `held`: the whole row repeats the one before, so nothing moved.
-    fn push(&mut self, v: f64, held: bool) {
-        self.min = self.min.min(v);
-        self.max = self.max.max(v);
-        self.sum += v;
-        self.sum_squares += v * v;
-        self.count += 1;
-        let size = v.abs();
-        if size > self.peak {
-            self.peak = size;
-            self.at_peak = 1;
-            self.run_at_peak = 1;
-            self.longest_at_peak = 1;
-        } else if size == self.peak {
-            self.at_peak += 1;
-            self.run_at_peak = match (v == self.last, held) {
-                (true, false) => self.run_at_peak + 1,
-                (true, true) => self.run_at_peak,
-                (false, _) => 1,
-            };
-            self.longest_at_peak = self.longest_at_peak.max(self.run_at_peak);
-        } else {
-            self.run_at_peak = 0;
-        }
-        self.run = if v == self.last { self.run + 1 } else { 1 };
-        self.longest_run = self.longest_run.max(self.run);
-        self.last = v;
-    }
-}
-
-/// Least squares of (clock - log time) against log time, both from the first sample, in seconds.
-#[derive(Clone, Copy, Debug, Default)]
-struct Offset {
-    origin: Option<(i64, i64)>,
-    n: f64,
-    mean_t: f64,
-    mean_d: f64,
-    tt: f64,
-    td: f64,
-    min: i64,
-    max: i64,
-}
-
-impl Offset {
-    fn push(&mut self, stamp: Nanos, log: Nanos) {
-        let difference = stamp.since(log);
-        let (log0, difference0) = *self.origin.get_or_insert((log.0, difference));
-        if self.n == 0.0 {
-            self.min = difference;
-            self.max = difference;
-        }
-        self.min = self.min.min(difference);
-        self.max = self.max.max(difference);
-        let t = log.since(Nanos(log0)) as f64 * 1e-9;
-        let d = difference.saturating_sub(difference0) as f64 * 1e-9;
-        self.n += 1.0;
-        let dt = t - self.mean_t;
-        self.mean_t += dt / self.n;
-        let dd = d - self.mean_d;
-        self.mean_d += dd / self.n;
-        self.tt += dt * (t - self.mean_t);
-        self.td += dt * (d - self.mean_d);
-    }
 }
 
 /// Sums over half a second.
@@ -205,40 +161,19 @@ impl Quality {
     pub fn new(clock: Clock) -> Self {
         Quality {
             clock,
-            count: 0,
-            no_stamp: 0,
-            first: None,
+            so_far: QualitySummary::default(),
             last: None,
-            high: None,
             primer: Vec::new(),
             nominal: None,
             spacing: Histogram::new(),
             jitter: Histogram::new(),
-            duplicates: 0,
-            collisions: 0,
             sharing: 1,
-            disorder: 0,
-            gaps: 0,
-            missing: 0,
             longest_gap: 0,
             hole: None,
-            no_gyro: 0,
-            not_finite: 0,
-            zero_rows: 0,
-            lone_zero_rows: 0,
             last_row_lone_zero: false,
-            repeated_rows: 0,
-            fast_rows: 0,
             axes: [Axis::EMPTY; 3],
             previous: None,
-            accel_count: 0,
-            accel_not_finite: 0,
-            near_one: 0,
-            near_thousand: 0,
-            orientations: 0,
             first_orientation: None,
-            orientation_varies: false,
-            intervals: 0,
             offset: Offset::default(),
             window: Window::default(),
             gravity: GravityTrack::default(),
@@ -248,14 +183,14 @@ impl Quality {
 
     /// Takes the next sample, in order of arrival.
     pub fn push(&mut self, raw: &RawSample) {
-        let index = self.count;
-        self.count += 1;
+        let index = self.so_far.count;
+        self.so_far.count += 1;
         if let Some(orientation) = raw.orientation {
-            self.orientations += 1;
+            self.so_far.with_orientation += 1;
             let first = *self.first_orientation.get_or_insert(orientation);
-            self.orientation_varies |= first != orientation;
+            self.so_far.orientation_varies |= first != orientation;
         }
-        self.intervals += u64::from(raw.interval_nanos.is_some());
+        self.so_far.with_interval += u64::from(raw.interval_nanos.is_some());
         let stamp = match self.clock {
             Clock::Index { rate_hz } => Some(Nanos((index as f64 * 1e9 / rate_hz) as i64)),
             clock => clock.read(raw),
@@ -267,7 +202,7 @@ impl Quality {
                     self.offset.push(header, raw.log);
                 }
             }
-            None => self.no_stamp += 1,
+            None => self.so_far.no_stamp += 1,
         }
         let accel = self.push_accel(raw.accel);
         if let Some(gyro) = self.push_gyro(raw.gyro)
@@ -278,18 +213,18 @@ impl Quality {
     }
 
     fn push_stamp(&mut self, stamp: Nanos, gyro: Option<[f64; 3]>) {
-        self.first.get_or_insert(stamp);
+        self.so_far.first.get_or_insert(stamp);
         if self.last == Some(stamp) {
-            self.duplicates += 1;
+            self.so_far.duplicates += 1;
             if gyro != self.previous {
-                self.collisions += 1;
-                self.sharing += i64::from(self.high == Some(stamp));
+                self.so_far.collisions += 1;
+                self.sharing += i64::from(self.so_far.newest == Some(stamp));
             }
         }
         self.last = Some(stamp);
-        match self.high {
+        match self.so_far.newest {
             Some(high) if stamp > high => {
-                self.high = Some(stamp);
+                self.so_far.newest = Some(stamp);
                 // n samples on one stamp and then a step are n samples in that step.
                 let sharing = std::mem::replace(&mut self.sharing, 1);
                 let step = stamp.since(high) / sharing;
@@ -299,11 +234,11 @@ impl Quality {
                 }
             }
             Some(high) if stamp < high => {
-                self.disorder += 1;
+                self.so_far.disorder += 1;
                 self.fill_hole(stamp);
             }
             Some(_) => {}
-            None => self.high = Some(stamp),
+            None => self.so_far.newest = Some(stamp),
         }
     }
 
@@ -314,8 +249,8 @@ impl Quality {
             && *missing > 0
         {
             *missing -= 1;
-            self.missing = self.missing.saturating_sub(1);
-            self.gaps -= u64::from(*missing == 0).min(self.gaps);
+            self.so_far.missing = self.so_far.missing.saturating_sub(1);
+            self.so_far.gaps -= u64::from(*missing == 0).min(self.so_far.gaps);
         }
     }
 
@@ -344,13 +279,13 @@ impl Quality {
         let nominal = self.nominal.unwrap_or(step).max(1);
         self.spacing.add(step);
         if step > nominal.saturating_add(nominal / 2) {
-            self.gaps += 1;
+            self.so_far.gaps += 1;
             if step > LONGEST_GAP_NANOS {
                 return 0;
             }
             let whole = step.saturating_add(nominal / 2) / nominal;
             let missing = u64::try_from(whole - 1).unwrap_or(0);
-            self.missing = self.missing.saturating_add(missing);
+            self.so_far.missing = self.so_far.missing.saturating_add(missing);
             self.longest_gap = self.longest_gap.max(step);
             missing
         } else {
@@ -363,26 +298,26 @@ impl Quality {
 
     fn push_gyro(&mut self, gyro: Option<[f64; 3]>) -> Option<[f64; 3]> {
         let Some(gyro) = gyro else {
-            self.no_gyro += 1;
+            self.so_far.no_gyro += 1;
             return None;
         };
         if gyro.iter().any(|v| !v.is_finite()) {
-            self.not_finite += 1;
+            self.so_far.not_finite += 1;
             return None;
         }
-        self.zero_rows += u64::from(gyro == [0.0; 3]);
+        self.so_far.zero_rows += u64::from(gyro == [0.0; 3]);
         let held = self.previous == Some(gyro);
-        self.repeated_rows += u64::from(held);
+        self.so_far.repeated_rows += u64::from(held);
         // A zero between readings that are none, and no rest: that takes two in a row.
         if self.last_row_lone_zero && gyro != [0.0; 3] {
-            self.lone_zero_rows += 1;
+            self.so_far.lone_zero_rows += 1;
         }
         self.last_row_lone_zero =
             gyro == [0.0; 3] && self.previous.is_some_and(|previous| previous != [0.0; 3]);
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        self.fast_rows +=
-            u64::from((advice::DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
+        self.so_far.fast_rows +=
+            u64::from((DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
         for (axis, v) in self.axes.iter_mut().zip(gyro) {
             axis.push(v, held);
         }
@@ -391,15 +326,15 @@ impl Quality {
 
     fn push_accel(&mut self, accel: Option<[f64; 3]>) -> Option<Vector3<f64>> {
         let accel = accel?;
-        self.accel_count += 1;
+        self.so_far.with_accel += 1;
         if accel.iter().any(|v| !v.is_finite()) {
-            self.accel_not_finite += 1;
+            self.so_far.accel_not_finite += 1;
             return None;
         }
         let accel = Vector3::from(accel);
         let length = accel.norm();
-        self.near_one += u64::from(NEAR_ONE.contains(&length));
-        self.near_thousand += u64::from(NEAR_ONE.contains(&(length * 1e-3)));
+        self.so_far.accel_near_one += u64::from(NEAR_ONE.contains(&length));
+        self.so_far.accel_near_thousand += u64::from(NEAR_ONE.contains(&(length * 1e-3)));
         Some(accel)
     }
 

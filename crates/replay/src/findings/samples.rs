@@ -1,20 +1,22 @@
 //! Statistics of the samples as recorded -> findings. Pure.
+//!
+//! A finding is a function here, or in a part of this, and its place in [`RULES`]; what it counts is counted in
+//! `strapd_attitude::condition::quality`. Thresholds are opinions, and stand by the words that they decide.
 
+mod gravity;
+mod stamps;
+#[cfg(test)]
+mod tests;
+
+pub(super) use self::stamps::missing_samples;
 use super::{Finding, Severity, verdicts};
 use crate::inspection::Inspection;
 use crate::summary::significant;
-use nalgebra::{Vector3, Vector4};
 use serde_json::json;
-use strapd_attitude::condition::quality::{Advice, AxisStats, GravityAxis};
-use strapd_attitude::frames::BodyAxes;
+use strapd_attitude::condition::quality::AxisStats;
 use strapd_attitude::record::Counts;
-use strapd_attitude::setting::{
-    AGAINST_RECORDED, BIAS, BODY, COLUMNS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP,
-    MOUNT, ON_GAP, RATE_HZ, REGULARISE_STAMPS, TIME,
-};
+use strapd_attitude::setting::{BIAS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG};
 
-/// Header and recorder's clock further apart than this are different clocks, s.
-const OTHER_CLOCK_SECS: f64 = 1.0;
 /// A bias is worth removing when it is this many sigmas from nothing, and above this rate (deg/h).
 const BIAS_SIGMAS: f64 = 5.0;
 const BIAS_DEG_PER_H: f64 = 10.0;
@@ -22,6 +24,49 @@ const BIAS_DEG_PER_H: f64 = 10.0;
 const REPEATED_SHARE: f64 = 0.003;
 /// Longer runs of one value are no repeats of a sensor with noise.
 const LONG_RUN: u64 = 20;
+/// Rates above this that stay this even are a saturation, not a rest, in rad/s or deg/s.
+const SATURATION_FLOOR: f64 = 1.0;
+const SATURATED_SAMPLES: u64 = 5;
+/// Turning over, a sampled sine stands at its largest value for two samples at most.
+const SATURATED_RUN: u64 = 3;
+/// A rest in rad/s is below this; in deg/s, a rest is below it times 57.
+const STILL_DEVIATION: f64 = 0.025;
+/// Longest credible run of one value from a moving, quantised sensor.
+const STUCK_SAMPLES: u64 = 100;
+
+/// Samples of a topic, and facts about them that several rules need.
+struct Seen<'a> {
+    looked: &'a Inspection,
+    /// Samples, as who has counted them says.
+    total: u64,
+    /// Size of the rates' unit in deg/s as in rad/s: 57.3 where they look like degrees.
+    unit: f64,
+    /// Length of the acceleration at rest, where there is a rest.
+    at_rest: Option<f64>,
+}
+
+/// A rule: adds its findings, if it has any.
+type Rule = fn(&Seen<'_>, &mut Vec<Finding>);
+
+/// The rules, in the order of what they find.
+const RULES: [Rule; 16] = [
+    rows,
+    clock,
+    degrees,
+    gravity::turns_otherwise,
+    stamps::stand_still,
+    never_still,
+    gravity::unit,
+    gravity::mounting,
+    clipped_or_stuck,
+    stamps::jitter,
+    stamps::drift,
+    stamps::missing,
+    stamps::slight_jitter,
+    silent,
+    stamps::other_clock,
+    bias,
+];
 
 /// Findings from the samples of a topic as they were recorded.
 #[must_use]
@@ -32,18 +77,8 @@ pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
 /// The same where a run has counted what became of them.
 pub(super) fn of_counted(looked: &Inspection, counts: &Counts) -> Vec<Finding> {
     let mut out = verdicts::find(counts);
-    rows(looked, counts.total(), &mut out);
-    if let Some(warning) = &looked.clock_warning {
-        out.push(
-            Finding::said(Severity::Warning, "clock", warning).with("clock", looked.clock.name()),
-        );
-    }
-    for advice in &looked.quality.advice {
-        out.extend(advised(looked, advice));
-    }
-    silent(looked, &mut out);
-    clocks(looked, &mut out);
-    bias(looked, &mut out);
+    let seen = Seen::of(looked, counts.total());
+    RULES.iter().for_each(|rule| rule(&seen, &mut out));
     // What nobody takes unasked spoils nothing.
     if !looked.is_likely {
         out.iter_mut().for_each(|f| f.severity = Severity::Note);
@@ -51,9 +86,131 @@ pub(super) fn of_counted(looked: &Inspection, counts: &Counts) -> Vec<Finding> {
     out
 }
 
+impl Seen<'_> {
+    fn of(looked: &Inspection, total: u64) -> Seen<'_> {
+        let unit = match is_fast(looked) || gravity::shows_degrees(looked) {
+            true => 57.3,
+            false => 1.0,
+        };
+        let seen = Seen {
+            looked,
+            total,
+            unit,
+            at_rest: None,
+        };
+        Seen {
+            at_rest: looked.quality.accel_at_rest.filter(|_| seen.is_still()),
+            ..seen
+        }
+    }
+
+    /// Whether the quietest half second is a rest.
+    fn is_still(&self) -> bool {
+        let deviation = self.looked.quality.quietest_deviation;
+        deviation.is_some_and(|deviation| deviation <= STILL_DEVIATION * self.unit)
+    }
+}
+
+/// Whether rates are too fast for rad/s. One in ten thousand may be a spike; a flipped bit is no unit.
+fn is_fast(looked: &Inspection) -> bool {
+    looked.quality.fast_rows > looked.quality.count / 10_000 + 2
+}
+
+fn degrees(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let axes = seen.looked.quality.axes.iter();
+    let peak = axes
+        .map(|a| a.max.abs().max(a.min.abs()))
+        .fold(0.0, f64::max);
+    if is_fast(seen.looked) {
+        out.push(rates_like_degrees(peak));
+    }
+}
+
+/// Warning about the clock.
+fn clock(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let name = seen.looked.clock.name();
+    out.extend(
+        seen.looked
+            .clock_warning
+            .as_ref()
+            .map(|warning| Finding::said(Severity::Warning, "clock", warning).with("clock", name)),
+    );
+}
+
+/// A body without a rest, of which no bias can be had.
+fn never_still(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    if seen.looked.quality.quietest_deviation.is_some() && !seen.is_still() {
+        out.push(
+            Finding::new(
+                Severity::Note,
+                "never-still",
+                "the body is never still for half a second",
+            )
+            .advise("no bias can be had from this log: give one, if it is known")
+            .help([BIAS.to("x,y,z")]),
+        );
+    }
+}
+
+/// Axes that spend many samples at exactly their largest reading, or repeat one value for long while others move.
+fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let axes = &seen.looked.quality.axes;
+    // One that never reads anything else is not there, or not turned about.
+    let moving = axes
+        .iter()
+        .enumerate()
+        .filter(|(_, stats)| stats.min < stats.max);
+    for (axis, stats) in moving {
+        let name = axis_name(axis);
+        let at = match stats.max.abs() >= stats.min.abs() {
+            true => stats.max,
+            false => stats.min,
+        };
+        if at.abs() > SATURATION_FLOOR * seen.unit
+            && stats.at_peak >= SATURATED_SAMPLES
+            && stats.longest_at_peak >= SATURATED_RUN
+        {
+            let samples = stats.at_peak;
+            out.push(
+                Finding::new(
+                    Severity::Error,
+                    "saturated",
+                    format!("gyro {name} reads exactly {at} in {samples} samples: looks saturated"),
+                )
+                .with("axis", name)
+                .with("reading", at)
+                .with("samples", samples)
+                .advise(
+                    "the true rate was higher: the attitude is wrong after it; have them flagged",
+                )
+                .help([GYRO_RANGE.to(format!("{:.4}", at.abs()))]),
+            );
+            // A clipped axis repeats one value too, for another reason.
+            continue;
+        }
+        let samples = stats.longest_run;
+        let mut others = axes.iter().enumerate().filter(|(i, _)| *i != axis);
+        let others_move = others.any(|(_, other)| other.longest_run * 10 < samples);
+        if samples >= STUCK_SAMPLES && others_move {
+            out.push(
+                Finding::new(
+                    Severity::Error,
+                    "stuck",
+                    format!(
+                        "gyro {name} repeats one value {samples} times in a row while the others move: stuck?"
+                    ),
+                )
+                .with("axis", name)
+                .with("samples", samples)
+                .advise("one axis repeats itself while the others move: the sensor or its driver is broken"),
+            );
+        }
+    }
+}
+
 /// Axes that never read but one value, while another moves.
-fn silent(looked: &Inspection, out: &mut Vec<Finding>) {
-    let q = &looked.quality;
+fn silent(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let q = &seen.looked.quality;
     let varies = |a: &AxisStats| a.max > a.min;
     if !q.axes.iter().any(varies) || q.count < LONG_RUN {
         return;
@@ -77,9 +234,9 @@ fn silent(looked: &Inspection, out: &mut Vec<Finding>) {
 }
 
 /// Rows that are bad in themselves, though they be used.
-fn rows(looked: &Inspection, total: u64, out: &mut Vec<Finding>) {
+fn rows(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     use Severity::Warning;
-    let q = &looked.quality;
+    let (q, total) = (&seen.looked.quality, seen.total);
     let repeated = q.repeated_rows.saturating_sub(q.duplicates);
     // A rest, or a steady turn, without noise repeats itself for long; a sensor read too often does not.
     let longest = q.axes.iter().map(|a| a.longest_run).max().unwrap_or(0);
@@ -104,226 +261,33 @@ fn rows(looked: &Inspection, total: u64, out: &mut Vec<Finding>) {
     out.extend(found.into_iter().flatten());
 }
 
-fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
-    use Severity::{Error, Note, Warning};
-    let stated_frd = looked.resolved.body == BodyAxes::Frd;
-    Some(match *advice {
-        Advice::RatesLookLikeDegrees { peak } => rates_like_degrees(peak),
-        Advice::GravityTurnsOtherwise { found, unit } => {
-            let share = match unit {
-                Some(_) => format!("{:.4}", found.factor),
-                None => format!("{:.2}", found.factor),
-            };
-            let seen = format!(
-                "gravity turns by {share} of what the gyro says (correlation {:.2})",
-                found.correlation
-            );
-            let what = match unit {
-                Some(unit) => format!("{seen}: the rates look like {unit}/s"),
-                None => format!("{seen}: gyro and accelerometer disagree about axes, signs or unit"),
-            };
-            let finding = Finding::new(Error, "unit-against-gravity", what)
-                .with("factor", found.factor)
-                .with("correlation", found.correlation);
-            match unit {
-                Some(unit) => finding
-                    .advise("the accelerometer shows the unit of the rates")
-                    .help([GYRO_UNIT.to(unit)]),
-                None => finding
-                    .advise("give the gyro's axes or unit as they are")
-                    .help([BODY.to("MAP")]).help([GYRO_UNIT.to("deg")]),
-            }
-        }
-        Advice::AccelNotInMetres { magnitude, unit } => not_in_metres(
-            looked,
-            format!("acceleration at rest is {magnitude:.3}: plausible in {unit}, not in m/s^2"),
-            unit,
-        )
-        .with("magnitude_at_rest", magnitude),
-        Advice::AccelMostlyOneG { share, unit } => not_in_metres(
-            looked,
-            format!(
-                "{:.0} % of the accelerations have the length of gravity in {unit}, not in m/s^2",
-                100.0 * share
-            ),
-            unit,
-        )
-        .with("share_of_one_g", share),
-        Advice::LooksLikeFrd if stated_frd => return None,
-        Advice::LooksLikeFrd => Finding::new(
-            Warning,
-            "looks-frd",
-            "gravity reads negative on z at rest: z points down",
-        )
-        .with("stated", looked.resolved.body.to_string())
-        .advise("the body looks like front, right, down")
-        .help([BODY.to("frd")]),
-        Advice::MountedOnSide { gravity } => Finding::new(
-            Note,
-            "mounted-on-side",
-            format!("gravity is on {gravity} at rest: the sensor is mounted on its side"),
-        )
-        .with("gravity", gravity.to_string())
-        .advise("the attitude is the sensor's; this mounting makes it level (its heading is free)")
-        .help([MOUNT.to(levelled(looked, gravity))]).help([BODY.to("MAP")]),
-        Advice::Saturated { axis, at, samples } => Finding::new(
-            Error,
-            "saturated",
-            format!(
-                "gyro {} reads exactly {at} in {samples} samples: looks saturated",
-                axis_name(axis)
-            ),
-        )
-        .with("axis", axis_name(axis))
-        .with("reading", at)
-        .with("samples", samples)
-        .advise("the true rate was higher: the attitude is wrong after it; have them flagged")
-        .help([GYRO_RANGE.to(format!("{:.4}", at.abs()))]),
-        Advice::Stuck { axis, samples } => Finding::new(
-            Error,
-            "stuck",
-            format!(
-                "gyro {} repeats one value {samples} times in a row while the others move: stuck?",
-                axis_name(axis)
-            ),
-        )
-        .with("axis", axis_name(axis))
-        .with("samples", samples)
-        .advise("one axis repeats itself while the others move: the sensor or its driver is broken"),
-        Advice::StampsStandStill => {
-            Finding::new(Error, "stamps-stand-still", "the stamps do not advance")
-                .advise("take another clock")
-                .help([TIME.to("log")]).help([TIME.to("index"), RATE_HZ.to("HZ")])
-        }
-        Advice::StampsJitter { share } => Finding::new(
-            Warning,
-            "jitter",
-            format!("stamps jitter by {:.0} % of the step (p99)", share * 100.0),
-        )
-        .with("p99_share_of_step", share)
-        .with(
-            "p99_s",
-            looked.quality.spacing.map_or(0.0, |s| s.jitter_p99_secs),
-        )
-        .advise("if the sensor samples evenly and only its stamps jitter, straighten them; if it samples unevenly, keep them")
-        .help([REGULARISE_STAMPS]),
-        Advice::StampsJitterEvenly { jitter, segments } => Finding::new(
-            Warning,
-            "jitter",
-            format!(
-                "stamps jitter by {:.1} % of the step (rms) about {}",
-                jitter * 100.0,
-                match segments {
-                    1 => "one constant rate".to_owned(),
-                    n => format!("{n} stretches of constant rate"),
-                }
-            ),
-        )
-        .with("rms_share_of_step", jitter)
-        .with("segments_of_constant_rate", segments)
-        .advise({
-            let advice = "if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them";
-            match looked.has_reference {
-                true => format!("{advice}: they cannot tell, {AGAINST_RECORDED} may"),
-                false => advice.to_owned(),
-            }
-        })
-        .help([REGULARISE_STAMPS]),
-        Advice::StampsUneven { share } => Finding::new(
-            Warning,
-            "jitter",
-            format!(
-                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate",
-                share * 100.0
-            ),
-        )
-        .with("p99_share_of_step", share)
-        .advise("another clock may be steadier; if no sample is missing, number them")
-        .help([TIME.to("log")]).help([TIME.to("index"), RATE_HZ.to("HZ")]),
-        Advice::ClocksDrift { ppm } => Finding::new(
-            Warning,
-            "clock-drift",
-            format!("header and log time drift apart by {ppm:.0} ppm"),
-        )
-        .with("ppm", ppm)
-        .advise("one of the clocks is wrong by as much, and so is every angle")
-        .help([TIME.to("header|log")]),
-        Advice::SamplesMissing {
-            missing,
-            longest_secs,
-        } => missing_samples(missing, longest_secs, looked.quality.gaps),
-        Advice::NeverStill => Finding::new(
-            Note,
-            "never-still",
-            "the body is never still for half a second",
-        )
-        .advise("no bias can be had from this log: give one, if it is known")
-        .help([BIAS.to("x,y,z")]),
-    })
-}
-
-/// Finding for so many missing samples.
-pub(super) fn missing_samples(missing: u64, longest_secs: f64, gaps: u64) -> Finding {
-    Finding::new(
-        Severity::Warning,
-        "missing",
-        format!("{missing} samples are missing, at most {longest_secs:.3} s at a time"),
-    )
-    .with("missing", missing)
-    .with("longest_s", longest_secs)
-    .with("gaps", gaps)
-    .advise("bridged by interpolation where short")
-    .help([MAX_GAP.to("SECS"), ON_GAP.to("hold|bridge|reset")])
-}
-
-/// An acceleration in another unit than the format has.
-fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Finding {
-    let found = Finding::new(Severity::Warning, "accel-unit", what).with("plausible_unit", unit);
-    if looked.aid.force_scale != 1.0 {
-        return found.advise(
-            "taken to be in g where gravity corrects the attitude; who else reads this log does not know",
+/// A bias at rest.
+fn bias(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let Some(found) = &seen.looked.bias else {
+        return;
+    };
+    let to_deg_per_h = |v: f64| v.to_degrees() * 3600.0;
+    let size = to_deg_per_h(found.bias.0.norm());
+    let sigma = found.sigma.norm();
+    if found.bias.0.norm() > BIAS_SIGMAS * sigma && size > BIAS_DEG_PER_H {
+        let bias: [f64; 3] = found.bias.into();
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "bias",
+                format!(
+                    "at rest the gyro reads {} deg/h (+- {}): so fast the attitude drifts",
+                    significant(size, 3),
+                    significant(to_deg_per_h(sigma), 2)
+                ),
+            )
+            .with("bias_rad_s", json!(bias))
+            .with("sigma_rad_s", sigma)
+            .with("rest_s", found.secs)
+            .advise("remove it")
+            .help([BIAS.to("auto")]),
         );
     }
-    // Of a table the columns say it.
-    match looked.format.is_table() {
-        true => found
-            .advise("so gravity cannot correct the attitude: say the unit")
-            .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),
-        false => found.advise(
-            "so gravity cannot correct the attitude, and no setting says otherwise: record m/s^2",
-        ),
-    }
-}
-
-/// The shortest turn from the sensor to a body with z up: gravity as a rest shows it, or the axis it is nearest to.
-fn levelled(looked: &Inspection, gravity: GravityAxis) -> String {
-    let longest = looked
-        .rests
-        .kept
-        .iter()
-        .max_by(|a, b| a.secs().total_cmp(&b.secs()));
-    let measured = longest
-        .and_then(|rest| rest.mean_accel)
-        .map(|f| *f.as_vector());
-    let axis = || {
-        let mut axis = Vector3::zeros();
-        if let Some(one) = axis.get_mut(gravity.axis) {
-            *one = if gravity.positive { 1.0 } else { -1.0 };
-        }
-        axis
-    };
-    let up = measured
-        .filter(|f| f.norm() > 0.0)
-        .unwrap_or_else(axis)
-        .normalize();
-    let q = level_turn(&up);
-    format!("q={:.6},{:.6},{:.6},0", q.x, q.y, q.z)
-}
-
-/// The shortest turn that brings `up`, of length 1, to z; upside down, the half turn about x. w, x, y, z.
-fn level_turn(up: &Vector3<f64>) -> Vector4<f64> {
-    let half = Vector4::new(1.0 + up.z, up.y, 0.0 - up.x, 0.0);
-    half.try_normalize(1e-6).unwrap_or_else(Vector4::y)
 }
 
 /// Finding for rates that no gyro reaches in rad/s.
@@ -374,86 +338,6 @@ pub(super) fn some(
     })
 }
 
-fn clocks(looked: &Inspection, out: &mut Vec<Finding>) {
-    if let Some(offset) = &looked.quality.offset
-        && offset.mean_secs.abs() > OTHER_CLOCK_SECS
-    {
-        out.push(
-            Finding::new(
-                Severity::Note,
-                "other-clock",
-                format!(
-                    "header stamps are {} s {} the recorder's clock",
-                    significant(offset.mean_secs.abs(), 4),
-                    if offset.mean_secs < 0.0 {
-                        "behind"
-                    } else {
-                        "ahead of"
-                    }
-                ),
-            )
-            .with("mean_s", offset.mean_secs)
-            .with("drift_ppm", offset.drift_ppm)
-            .advise("different clocks, or a log played again; compare only on one of them")
-            .help([TIME.to("header|log")]),
-        );
-    }
-}
-
-fn bias(looked: &Inspection, out: &mut Vec<Finding>) {
-    let Some(found) = &looked.bias else {
-        return;
-    };
-    let to_deg_per_h = |v: f64| v.to_degrees() * 3600.0;
-    let size = to_deg_per_h(found.bias.0.norm());
-    let sigma = found.sigma.norm();
-    if found.bias.0.norm() > BIAS_SIGMAS * sigma && size > BIAS_DEG_PER_H {
-        let bias: [f64; 3] = found.bias.into();
-        out.push(
-            Finding::new(
-                Severity::Warning,
-                "bias",
-                format!(
-                    "at rest the gyro reads {} deg/h (+- {}): so fast the attitude drifts",
-                    significant(size, 3),
-                    significant(to_deg_per_h(sigma), 2)
-                ),
-            )
-            .with("bias_rad_s", json!(bias))
-            .with("sigma_rad_s", sigma)
-            .with("rest_s", found.secs)
-            .advise("remove it")
-            .help([BIAS.to("auto")]),
-        );
-    }
-}
-
 fn axis_name(axis: usize) -> &'static str {
     ["x", "y", "z"].get(axis).copied().unwrap_or("?")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{Quaternion, UnitQuaternion};
-
-    #[test]
-    fn whatever_is_up_comes_to_z_upside_down_too() {
-        let ups = [
-            Vector3::x(),
-            -Vector3::x(),
-            Vector3::y(),
-            -Vector3::y(),
-            Vector3::z(),
-            -Vector3::z(),
-            Vector3::new(1e-9, -1e-9, -1.0),
-            Vector3::new(0.6, 0.0, -0.8),
-        ];
-        for up in ups {
-            let q = level_turn(&up);
-            let turn = UnitQuaternion::from_quaternion(Quaternion::new(q.x, q.y, q.z, q.w));
-            let error = (turn * up - Vector3::z()).norm();
-            assert!(error < 1e-5, "{up}: {q}, off by {error}");
-        }
-    }
 }

@@ -137,7 +137,7 @@ impl Look {
         let mut counts = self.conditioned.counts();
         counts.add_many(Verdict::Undecodable, self.undecodable);
         let mut quality = self.quality.summary();
-        quality.judge_lines(&self.stamps.finish());
+        quality.lines = Some(self.stamps.finish());
         Ok(Inspection {
             topic: self.topic,
             of: self.of,

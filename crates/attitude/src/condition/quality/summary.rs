@@ -1,10 +1,9 @@
-//! Sums -> numbers for people. Pure.
+//! Sums of axes, steps and clocks -> numbers for people. Pure.
 //!
 //! A stage of its own so that counting, which runs per sample, stays apart from dividing, which
 //! runs once.
 
-use super::advice::{Advice, advise};
-use super::{Axis, GyroAgainstGravity, Quality};
+use super::{Quality, QualitySummary};
 use crate::record::Nanos;
 use nalgebra::Vector3;
 
@@ -75,125 +74,132 @@ impl std::fmt::Display for GravityAxis {
     }
 }
 
-/// Everything `info` prints about one topic.
-#[derive(Clone, PartialEq, Debug)]
-pub struct QualitySummary {
-    /// Samples seen.
-    pub count: u64,
-    /// Samples without a stamp of the chosen clock.
-    pub no_stamp: u64,
-    /// First stamp, in order of arrival.
-    pub first: Option<Nanos>,
-    /// Newest stamp.
-    pub newest: Option<Nanos>,
-    /// Newest minus first, s.
-    pub duration_secs: f64,
-    /// Steps and jitter; `None` below two stamps that advance.
-    pub spacing: Option<SpacingStats>,
-    /// Deviations from the ordinary step: `from..to` in ns, by octave, and how many.
-    pub jitter: Vec<(f64, f64, u64)>,
-    /// Steps with samples missing.
-    pub gaps: u64,
-    /// Samples missing in them, by the ordinary step.
-    pub missing: u64,
-    /// The longest, s.
-    pub longest_gap_secs: f64,
-    /// Samples with their predecessor's stamp.
-    pub duplicates: u64,
-    /// Number of these with other data than it.
-    pub collisions: u64,
-    /// Samples older than one before them.
-    pub disorder: u64,
-    /// Header minus log time; `None` without header stamps.
-    pub offset: Option<OffsetStats>,
-    /// Samples without a gyro.
-    pub no_gyro: u64,
-    /// Samples with NaN or infinity in the gyro.
-    pub not_finite: u64,
-    /// Samples with a gyro of exactly (0, 0, 0).
-    pub zero_rows: u64,
-    /// Number of these, alone between two that are not.
-    pub lone_zero_rows: u64,
-    /// Samples with exactly their predecessor's gyro.
-    pub repeated_rows: u64,
-    /// x, y, z.
-    pub axes: [AxisStats; 3],
-    /// Samples with an acceleration.
-    pub with_accel: u64,
-    /// Number of these with NaN or infinity.
-    pub accel_not_finite: u64,
-    /// Number of these with a length of 0.8 to 1.25, as of gravity in g.
-    pub accel_near_one: u64,
-    /// Number of these with a length of 800 to 1250, as of gravity in mg.
-    pub accel_near_thousand: u64,
-    /// Samples with an orientation.
-    pub with_orientation: u64,
-    /// Whether any of these is another than the first: some drivers fill the field with one.
-    pub orientation_varies: bool,
-    /// Samples that state their own integration interval.
-    pub with_interval: u64,
-    /// Start of the quietest half second.
-    pub quietest_at: Option<Nanos>,
-    /// Largest gyro deviation in it, source's unit.
-    pub quietest_deviation: Option<f64>,
-    /// Mean rate in it, source's unit: the bias, if it is a rest.
-    pub quietest_rate: Option<Vector3<f64>>,
-    /// Magnitude of the mean acceleration in it, source's unit.
-    pub accel_at_rest: Option<f64>,
-    /// The axis that holds at least 0.8 of it.
-    pub gravity: Option<GravityAxis>,
-    /// Whether the gyro's unit and signs agree with the turning of gravity; `None` where gravity turned too little.
-    pub gyro_against_gravity: Option<GyroAgainstGravity>,
-    /// Advice that follows.
-    pub advice: Vec<Advice>,
+/// One gyro axis, over finite samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    min: f64,
+    max: f64,
+    sum: f64,
+    sum_squares: f64,
+    count: u64,
+    /// Samples at the largest magnitude so far, the longest run of them while the other axes moved,
+    /// and the run under way.
+    at_peak: u64,
+    longest_at_peak: u64,
+    run_at_peak: u64,
+    peak: f64,
+    /// Samples in a row with this value, and the longest such run.
+    run: u64,
+    longest_run: u64,
+    last: f64,
 }
 
+impl Axis {
+    pub(super) const EMPTY: Axis = Axis {
+        min: f64::INFINITY,
+        max: f64::NEG_INFINITY,
+        sum: 0.0,
+        sum_squares: 0.0,
+        count: 0,
+        at_peak: 0,
+        longest_at_peak: 0,
+        run_at_peak: 0,
+        peak: 0.0,
+        run: 0,
+        longest_run: 0,
+        last: f64::NAN,
+    };
+
+    /// `held`: the whole row repeats the one before, so nothing moved.
+    pub(super) fn push(&mut self, v: f64, held: bool) {
+        self.min = self.min.min(v);
+        self.max = self.max.max(v);
+        self.sum += v;
+        self.sum_squares += v * v;
+        self.count += 1;
+        let size = v.abs();
+        if size > self.peak {
+            self.peak = size;
+            self.at_peak = 1;
+            self.run_at_peak = 1;
+            self.longest_at_peak = 1;
+        } else if size == self.peak {
+            self.at_peak += 1;
+            self.run_at_peak = match (v == self.last, held) {
+                (true, false) => self.run_at_peak + 1,
+                (true, true) => self.run_at_peak,
+                (false, _) => 1,
+            };
+            self.longest_at_peak = self.longest_at_peak.max(self.run_at_peak);
+        } else {
+            self.run_at_peak = 0;
+        }
+        self.run = if v == self.last { self.run + 1 } else { 1 };
+        self.longest_run = self.longest_run.max(self.run);
+        self.last = v;
+    }
+}
+
+/// Least squares of (clock - log time) against log time, both from the first sample, in seconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Offset {
+    origin: Option<(i64, i64)>,
+    n: f64,
+    mean_t: f64,
+    mean_d: f64,
+    tt: f64,
+    td: f64,
+    min: i64,
+    max: i64,
+}
+
+impl Offset {
+    pub(super) fn push(&mut self, stamp: Nanos, log: Nanos) {
+        let difference = stamp.since(log);
+        let (log0, difference0) = *self.origin.get_or_insert((log.0, difference));
+        if self.n == 0.0 {
+            self.min = difference;
+            self.max = difference;
+        }
+        self.min = self.min.min(difference);
+        self.max = self.max.max(difference);
+        let t = log.since(Nanos(log0)) as f64 * 1e-9;
+        let d = difference.saturating_sub(difference0) as f64 * 1e-9;
+        self.n += 1.0;
+        let dt = t - self.mean_t;
+        self.mean_t += dt / self.n;
+        let dd = d - self.mean_d;
+        self.mean_d += dd / self.n;
+        self.tt += dt * (t - self.mean_t);
+        self.td += dt * (d - self.mean_d);
+    }
+}
+
+/// Fills in what is computed of the sums of `quality`.
 pub(super) fn summarise(quality: &Quality) -> QualitySummary {
     let secs = |nanos: i64| nanos as f64 * 1e-9;
-    let newest = quality.high;
-    let duration_secs = match (quality.first, newest) {
+    let so_far = quality.so_far.clone();
+    let duration_secs = match (so_far.first, so_far.newest) {
         (Some(first), Some(newest)) => newest.secs_since(first),
         _ => 0.0,
     };
-    let gravity = quality.quietest.and_then(|q| q.accel).and_then(gravity);
-    let mut summary = QualitySummary {
-        count: quality.count,
-        no_stamp: quality.no_stamp,
-        first: quality.first,
-        newest,
+    let quietest = quality.quietest.as_ref();
+    let accel = quietest.and_then(|q| q.accel);
+    QualitySummary {
         duration_secs,
         spacing: quality.nominal.map(|_| spacing(quality)),
         jitter: quality.jitter.octaves(),
-        gaps: quality.gaps,
-        missing: quality.missing,
         longest_gap_secs: secs(quality.longest_gap),
-        duplicates: quality.duplicates,
-        collisions: quality.collisions,
-        disorder: quality.disorder,
         offset: offset(quality, duration_secs),
-        no_gyro: quality.no_gyro,
-        not_finite: quality.not_finite,
-        zero_rows: quality.zero_rows,
-        lone_zero_rows: quality.lone_zero_rows,
-        repeated_rows: quality.repeated_rows,
         axes: quality.axes.map(axis),
-        with_accel: quality.accel_count,
-        accel_not_finite: quality.accel_not_finite,
-        accel_near_one: quality.near_one,
-        accel_near_thousand: quality.near_thousand,
-        with_orientation: quality.orientations,
-        orientation_varies: quality.orientation_varies,
-        with_interval: quality.intervals,
-        quietest_at: quality.quietest.map(|q| q.start),
-        quietest_deviation: quality.quietest.map(|q| q.deviation),
-        quietest_rate: quality.quietest.map(|q| q.mean),
-        accel_at_rest: quality.quietest.and_then(|q| q.accel).map(|a| a.norm()),
-        gravity,
+        quietest_at: quietest.map(|q| q.start),
+        quietest_deviation: quietest.map(|q| q.deviation),
+        quietest_rate: quietest.map(|q| q.mean),
+        accel_at_rest: accel.map(|a| a.norm()),
+        gravity: accel.and_then(gravity),
         gyro_against_gravity: quality.gravity.result(),
-        advice: Vec::new(),
-    };
-    summary.advice = advise(&summary, quality.quietest.as_ref(), quality.fast_rows);
-    summary
+        ..so_far
+    }
 }
 
 fn spacing(quality: &Quality) -> SpacingStats {

@@ -1,0 +1,232 @@
+//! Gravity as the accelerometer shows it -> findings about units, axes and mounting. Pure.
+
+use super::{Finding, Seen, Severity};
+use crate::inspection::Inspection;
+use nalgebra::{Vector3, Vector4};
+use strapd_attitude::condition::quality::GravityAxis;
+use strapd_attitude::frames::BodyAxes;
+use strapd_attitude::setting::{BODY, COLUMNS, GYRO_UNIT, MOUNT};
+
+/// Below this correlation the accelerometer reads too much besides gravity.
+const MIN_CORRELATION: f64 = 0.7;
+/// Factors within 2.5 of a unit's belong to it; accelerations make them vary.
+const UNIT_FACTOR: f64 = 2.5;
+/// Fewer accelerations tell nothing of their unit.
+const FEWEST: u64 = 20;
+
+/// Whether gravity turns in the accelerometer by another factor than the gyro says; and the gyro's unit that fits, if
+/// one does.
+fn another_factor(looked: &Inspection) -> Option<Option<&'static str>> {
+    let found = looked.quality.gyro_against_gravity?;
+    let is_near = |factor: f64| (1.0 / UNIT_FACTOR..=UNIT_FACTOR).contains(&factor);
+    let is_seen = found.correlation.abs() > MIN_CORRELATION;
+    if !is_seen || is_near(found.factor) {
+        return None;
+    }
+    let units = [("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3)];
+    let mut fitting = units
+        .iter()
+        .filter(|(_, unit)| is_near(found.factor / unit));
+    Some(fitting.next().map(|(name, _)| *name))
+}
+
+/// Whether the gyro is in deg/s by what gravity does.
+pub(super) fn shows_degrees(looked: &Inspection) -> bool {
+    another_factor(looked) == Some(Some("deg"))
+}
+
+/// Rates that turn gravity by another factor than it turns.
+pub(super) fn turns_otherwise(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let looked = seen.looked;
+    let (Some(found), Some(unit)) = (looked.quality.gyro_against_gravity, another_factor(looked))
+    else {
+        return;
+    };
+    let share = match unit {
+        Some(_) => format!("{:.4}", found.factor),
+        None => format!("{:.2}", found.factor),
+    };
+    let turns = format!(
+        "gravity turns by {share} of what the gyro says (correlation {:.2})",
+        found.correlation
+    );
+    let what = match unit {
+        Some(unit) => format!("{turns}: the rates look like {unit}/s"),
+        None => format!("{turns}: gyro and accelerometer disagree about axes, signs or unit"),
+    };
+    let finding = Finding::new(Severity::Error, "unit-against-gravity", what)
+        .with("factor", found.factor)
+        .with("correlation", found.correlation);
+    out.push(match unit {
+        Some(unit) => finding
+            .advise("the accelerometer shows the unit of the rates")
+            .help([GYRO_UNIT.to(unit)]),
+        None => finding
+            .advise("give the gyro's axes or unit as they are")
+            .help([BODY.to("MAP")])
+            .help([GYRO_UNIT.to("deg")]),
+    });
+}
+
+/// Accelerations in g: at rest, or as most of them are long where nothing rests.
+pub(super) fn unit(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let at_rest = seen
+        .at_rest
+        .and_then(|size| Some((size, accel_unit(size)?)));
+    out.extend(match at_rest {
+        Some((magnitude, unit)) => Some(
+            not_in_metres(
+                seen.looked,
+                format!("acceleration at rest is {magnitude:.3}: plausible in {unit}, not in m/s^2"),
+                unit,
+            )
+            .with("magnitude_at_rest", magnitude),
+        ),
+        // Who is never at rest has gravity in most of his accelerations.
+        None => mostly_one_g(seen.looked).map(|(share, unit)| {
+            not_in_metres(
+                seen.looked,
+                format!(
+                    "{:.0} % of the accelerations have the length of gravity in {unit}, not in m/s^2",
+                    100.0 * share
+                ),
+                unit,
+            )
+            .with("share_of_one_g", share)
+        }),
+    });
+}
+
+/// The unit in which this is one g, when it is not m/s^2. Gravity is 9.78 to 9.83 m/s^2; scale and
+/// bias of a cheap accelerometer make that 5 %.
+fn accel_unit(magnitude: f64) -> Option<&'static str> {
+    let near = |g: f64| (magnitude / g - 1.0).abs() < 0.05;
+    let units = [("g", 1.0), ("mg", 1000.0)];
+    units.iter().find(|(_, g)| near(*g)).map(|(name, _)| *name)
+}
+
+/// Share of the accelerations that have the length of one g, and the unit. Accelerations without gravity are as long,
+/// too, where somebody walks, but not for most of the time: lengths of a normal spread about nothing lie within 0.8 to
+/// 1.25 in 38 of 100 cases at most.
+fn mostly_one_g(looked: &Inspection) -> Option<(f64, &'static str)> {
+    let q = &looked.quality;
+    let finite = q.with_accel.saturating_sub(q.accel_not_finite);
+    let units = [(q.accel_near_one, "g"), (q.accel_near_thousand, "mg")];
+    let is_most = |near: u64| finite >= FEWEST && near > finite / 2;
+    let (near, unit) = units.into_iter().find(|(near, _)| is_most(*near))?;
+    Some((near as f64 / finite as f64, unit))
+}
+
+/// A body whose z does not point up at rest.
+pub(super) fn mounting(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let stated = seen.looked.resolved.body;
+    let gravity = seen
+        .looked
+        .quality
+        .gravity
+        .filter(|_| seen.at_rest.is_some());
+    out.extend(match gravity {
+        None => None,
+        Some(GravityAxis { axis: 2, positive }) => {
+            (!positive && stated != BodyAxes::Frd).then(|| {
+                Finding::new(
+                    Severity::Warning,
+                    "looks-frd",
+                    "gravity reads negative on z at rest: z points down",
+                )
+                .with("stated", stated.to_string())
+                .advise("the body looks like front, right, down")
+                .help([BODY.to("frd")])
+            })
+        }
+        Some(gravity) => Some(
+            Finding::new(
+                Severity::Note,
+                "mounted-on-side",
+                format!("gravity is on {gravity} at rest: the sensor is mounted on its side"),
+            )
+            .with("gravity", gravity.to_string())
+            .advise(
+                "the attitude is the sensor's; this mounting makes it level (its heading is free)",
+            )
+            .help([MOUNT.to(levelled(seen.looked, gravity))])
+            .help([BODY.to("MAP")]),
+        ),
+    });
+}
+
+/// An acceleration in another unit than the format has.
+fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Finding {
+    let found = Finding::new(Severity::Warning, "accel-unit", what).with("plausible_unit", unit);
+    if looked.aid.force_scale != 1.0 {
+        return found.advise(
+            "taken to be in g where gravity corrects the attitude; who else reads this log does not know",
+        );
+    }
+    // Of a table the columns say it.
+    match looked.format.is_table() {
+        true => found
+            .advise("so gravity cannot correct the attitude: say the unit")
+            .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),
+        false => found.advise(
+            "so gravity cannot correct the attitude, and no setting says otherwise: record m/s^2",
+        ),
+    }
+}
+
+/// The shortest turn from the sensor to a body with z up: gravity as a rest shows it, or the axis it is nearest to.
+fn levelled(looked: &Inspection, gravity: GravityAxis) -> String {
+    let longest = looked
+        .rests
+        .kept
+        .iter()
+        .max_by(|a, b| a.secs().total_cmp(&b.secs()));
+    let measured = longest
+        .and_then(|rest| rest.mean_accel)
+        .map(|f| *f.as_vector());
+    let axis = || {
+        let mut axis = Vector3::zeros();
+        if let Some(one) = axis.get_mut(gravity.axis) {
+            *one = if gravity.positive { 1.0 } else { -1.0 };
+        }
+        axis
+    };
+    let up = measured
+        .filter(|f| f.norm() > 0.0)
+        .unwrap_or_else(axis)
+        .normalize();
+    let q = level_turn(&up);
+    format!("q={:.6},{:.6},{:.6},0", q.x, q.y, q.z)
+}
+
+/// The shortest turn that brings `up`, of length 1, to z; upside down, the half turn about x. w, x, y, z.
+fn level_turn(up: &Vector3<f64>) -> Vector4<f64> {
+    let half = Vector4::new(1.0 + up.z, up.y, 0.0 - up.x, 0.0);
+    half.try_normalize(1e-6).unwrap_or_else(Vector4::y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Quaternion, UnitQuaternion};
+
+    #[test]
+    fn whatever_is_up_comes_to_z_upside_down_too() {
+        let ups = [
+            Vector3::x(),
+            -Vector3::x(),
+            Vector3::y(),
+            -Vector3::y(),
+            Vector3::z(),
+            -Vector3::z(),
+            Vector3::new(1e-9, -1e-9, -1.0),
+            Vector3::new(0.6, 0.0, -0.8),
+        ];
+        for up in ups {
+            let q = level_turn(&up);
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(q.x, q.y, q.z, q.w));
+            let error = (turn * up - Vector3::z()).norm();
+            assert!(error < 1e-5, "{up}: {q}, off by {error}");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Samples whose properties are known -> the findings about them, and no others.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing)]
+
+use super::of_samples;
+use crate::finding::Finding;
+use crate::inspection::{Aids, Inspection};
+use strapd_attitude::condition::quality::{GravityAxis, Quality};
+use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::record::{Counts, Declared, Nanos, RawSample, Verdict};
+use strapd_recording::format::Format;
+
+/// Sample number `n` of a 200 Hz stream whose values tell which one it is.
+fn sample(n: i64) -> RawSample {
+    let stamp = 1_700_000_000_000_000_000 + n * 5_000_000;
+    RawSample {
+        header: Some(Nanos(stamp)),
+        log: Nanos(stamp + 1_000_000),
+        gyro: Some([n as f64 * 1e-3, 0.5, -0.25]),
+        accel: Some([0.0, 0.0, 9.81]),
+        ..RawSample::default()
+    }
+}
+
+/// A topic of these samples, looked at.
+fn looked(raw: &[RawSample]) -> Inspection {
+    let mut quality = Quality::new(Clock::Header);
+    raw.iter().for_each(|r| quality.push(r));
+    let mut counts = Counts::default();
+    counts.add_many(Verdict::Accepted, raw.len() as u64);
+    Inspection {
+        topic: "/imu".to_owned(),
+        of: "/imu".to_owned(),
+        described: "imu [cdr]".to_owned(),
+        format: Format::Mcap,
+        frame: String::new(),
+        resolved: Meaning::new(&Plan::default(), &Declared::default()),
+        kind_stated: true,
+        quality: quality.summary(),
+        quality_unit: GyroUnit::Rad,
+        rests: Default::default(),
+        bias: None,
+        counts,
+        undecodable: 0,
+        clock: Clock::Header,
+        clock_warning: None,
+        aid: Aids {
+            force_scale: 1.0,
+            ..Aids::default()
+        },
+        is_likely: true,
+        has_reference: false,
+    }
+}
+
+fn codes(found: &[Finding]) -> Vec<&'static str> {
+    found.iter().map(|finding| finding.code).collect()
+}
+
+fn one<'a>(found: &'a [Finding], code: &str) -> Option<&'a Finding> {
+    found.iter().find(|finding| finding.code == code)
+}
+
+/// Still, with a little noise that never repeats, for `secs` at 200 Hz.
+fn still(secs: i64, accel: [f64; 3]) -> Vec<RawSample> {
+    (0..secs * 200)
+        .map(|n| {
+            let noise = |k: i64| ((n * k) % 1009 - 504) as f64 * 1e-6;
+            RawSample {
+                gyro: Some([noise(7919), noise(104_729), noise(1_299_709)]),
+                accel: Some(accel),
+                ..sample(n)
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn gravity_tells_axis_sign_and_unit() {
+    for (accel, axis, positive, advice) in [
+        ([0.1, 0.2, 9.8], 2, true, None),
+        ([0.1, 0.2, -9.8], 2, false, Some(("looks-frd", "body frd"))),
+        (
+            [9.8, 0.0, 0.3],
+            0,
+            true,
+            // From x to z: a quarter turn about -y.
+            Some((
+                "mounted-on-side",
+                "mount q=0.707107,0.000000,-0.707107,0, or body MAP",
+            )),
+        ),
+        ([0.0, 0.0, 1.0], 2, true, Some(("accel-unit", ""))),
+        ([0.0, 0.0, 1000.0], 2, true, Some(("accel-unit", ""))),
+    ] {
+        let looked = looked(&still(10, accel));
+        assert_eq!(looked.quality.gravity, Some(GravityAxis { axis, positive }));
+        let found = of_samples(&looked);
+        assert!(found.len() <= 1, "{found:?}");
+        let found = found.first().map(|one| (one.code, one.flags()));
+        assert_eq!(
+            found.as_ref().map(|(code, flags)| (*code, flags.as_str())),
+            advice,
+            "{accel:?}"
+        );
+    }
+    let tilted = looked(&still(10, [5.7, 5.6, 5.7]));
+    assert_eq!(tilted.quality.gravity, None);
+}
+
+#[test]
+fn most_forces_of_one_g_tell_the_unit_where_nothing_is_still_and_motion_alone_does_not() {
+    // Turned and shaken about: gravity and 0.3 of it, in every direction, at a rate that is never even.
+    let shaken = |gravity: f64, shake: f64| -> Vec<RawSample> {
+        let at = |n: i64| {
+            let t = n as f64 * 0.01;
+            let (a, b) = ((2.0 * t).sin(), (1.3 * t).cos());
+            let up = nalgebra::Vector3::new(a, b, 0.5 - a * b).normalize();
+            let other =
+                nalgebra::Vector3::new((31.0 * t).sin(), (37.0 * t).cos(), (41.0 * t).sin());
+            RawSample {
+                gyro: Some([(9.0 * t).sin(), (7.0 * t).cos(), 1.0]),
+                accel: Some((up * gravity + other * shake).into()),
+                ..sample(n)
+            }
+        };
+        (0..2000).map(at).collect()
+    };
+    let unit = |raw: &[RawSample]| {
+        let found = of_samples(&looked(raw));
+        assert!(codes(&found).contains(&"never-still"), "{found:?}");
+        let one = one(&found, "accel-unit")?;
+        let share = one.evidence["share_of_one_g"].as_f64().unwrap();
+        assert!((0.5..=1.0).contains(&share), "{share}");
+        one.evidence["plausible_unit"].as_str().map(str::to_owned)
+    };
+    assert_eq!(unit(&shaken(1.0, 0.1)), Some("g".to_owned()));
+    assert_eq!(unit(&shaken(1000.0, 100.0)), Some("mg".to_owned()));
+    assert_eq!(unit(&shaken(9.81, 3.0)), None);
+    // Without gravity, of any size.
+    for size in [0.3, 0.6, 0.8, 1.0, 1.3, 2.0] {
+        let mut raw = shaken(0.0, 1.0);
+        // Three numbers that are spread normally, or nearly: the sum of twelve that are even.
+        let mut state = 1_u64;
+        let mut normal = || {
+            let mut even = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            (0..12).map(|_| even()).sum::<f64>() - 6.0
+        };
+        for one in &mut raw {
+            one.accel = Some([size * normal(), size * normal(), size * normal()]);
+        }
+        assert_eq!(unit(&raw), None, "{size}");
+    }
+    // Of a few samples nothing is said.
+    let few = shaken(1.0, 0.1).into_iter().take(19).collect::<Vec<_>>();
+    assert!(!codes(&of_samples(&looked(&few))).contains(&"accel-unit"));
+}
+
+#[test]
+fn rates_no_gyro_has_are_taken_for_degrees_but_a_spike_is_not() {
+    let turning = |n: i64, peak: f64| RawSample {
+        gyro: Some([peak * (n as f64 * 0.01).sin(), 0.0, 1.0]),
+        ..sample(n)
+    };
+    let raw: Vec<RawSample> = (0..2000).map(|n| turning(n, 500.0)).collect();
+    let degrees = |raw: &[RawSample]| codes(&of_samples(&looked(raw))).contains(&"unit-degrees");
+    assert!(degrees(&raw));
+    let mut raw: Vec<RawSample> = (0..2000).map(|n| turning(n, 5.0)).collect();
+    raw[1000].gyro = Some([700.0, 0.0, 0.0]);
+    raw[1001].gyro = Some([6e302, 0.0, 0.0]);
+    assert!(!degrees(&raw));
+}
+
+#[test]
+fn a_clipped_and_a_stuck_axis_are_found() {
+    let raw: Vec<RawSample> = (0..4000)
+        .map(|n| {
+            let x = 50.0 * (n as f64 * 0.013).sin();
+            // Dies after a thousand samples.
+            let z = 0.001 * n.min(1000) as f64;
+            RawSample {
+                gyro: Some([x.clamp(-34.9, 34.9), (n as f64 * 0.007).cos(), z]),
+                ..sample(n)
+            }
+        })
+        .collect();
+    let found = of_samples(&looked(&raw));
+    let saturated = one(&found, "saturated").unwrap();
+    assert_eq!(saturated.evidence["axis"], "x");
+    assert_eq!(saturated.evidence["reading"], 34.9);
+    let stuck = one(&found, "stuck").unwrap();
+    assert_eq!(stuck.evidence["axis"], "z");
+    assert_eq!(stuck.evidence["samples"], 3000);
+}
+
+#[test]
+fn exact_data_is_neither_clipped_nor_stuck_nor_short_of_samples() {
+    // A coning body: two axes swing to the same largest value again and again, the third is constant;
+    // stamps that jitter by a third of a step without one missing.
+    let looked = looked(
+        &(0..2000)
+            .map(|n| {
+                let phase = std::f64::consts::TAU * (n % 40) as f64 / 40.0;
+                let jitter = [0, 0, 0, -1_700_000, 1_700_000, 0, 0, 0][n as usize % 8];
+                let stamp = sample(n).header.map(|Nanos(t)| Nanos(t + jitter));
+                RawSample {
+                    gyro: Some([3.0 * phase.cos(), 3.0 * phase.sin(), -0.25]),
+                    header: stamp,
+                    ..sample(n)
+                }
+            })
+            .collect::<Vec<_>>(),
+    );
+    assert!(
+        looked.quality.missing > 0,
+        "steps of 8.4 ms instead of 5 look like gaps: {looked:?}"
+    );
+    let found = of_samples(&looked);
+    for wrong in ["saturated", "stuck", "missing"] {
+        assert!(!codes(&found).contains(&wrong), "{found:?}");
+    }
+}
