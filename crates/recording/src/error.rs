@@ -129,6 +129,18 @@ pub enum Error {
 }
 
 impl Error {
+    /// The same in one line, without the topics that there are.
+    #[must_use]
+    pub fn unlisted(&self) -> Diagnostic {
+        match self {
+            Error::NoImuTopic {
+                path, undefined, ..
+            } => no_imu_topic(path, "", undefined.as_deref()),
+            Error::SeveralImuTopics { path, .. } => several_imu_topics(path, ""),
+            other => Diagnostic::from(other),
+        }
+    }
+
     /// Error for what cannot be read of this file.
     pub(crate) fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> Error {
         Error::Unsupported {
@@ -136,6 +148,27 @@ impl Error {
             what: what.into(),
         }
     }
+}
+
+fn no_imu_topic(path: &Path, listed: &str, undefined: Option<&str>) -> Diagnostic {
+    Diagnostic::new(format!(
+        "{}: no IMU topic: nothing in it carries a body rate with a stamp{listed}",
+        path.display()
+    ))
+    .help(match undefined {
+        Some(kind) => defining(kind),
+        None => format!("{TOPIC} NAME with {FIELD} gyro=PATH names a rate in any message"),
+    })
+}
+
+fn several_imu_topics(path: &Path, listed: &str) -> Diagnostic {
+    Diagnostic::new(format!(
+        "{}: several IMU topics or publishers, and they must not be mixed{listed}",
+        path.display()
+    ))
+    .help(format!(
+        "{TOPIC} NAME takes one of them, {TOPIC} all each of them"
+    ))
 }
 
 impl From<&Error> for Diagnostic {
@@ -165,9 +198,10 @@ impl From<&Error> for Diagnostic {
                 "{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n",
                 path.display()
             )),
-            Error::NotTable { path, why } => why
-                .clone()
-                .at(format_args!("{}: no table that can be read", path.display())),
+            Error::NotTable { path, why } => why.clone().at(format_args!(
+                "{}: no table that can be read",
+                path.display()
+            )),
             Error::NotRead { path, format } => Diagnostic::new(format!(
                 "{}: is {}, which is not read",
                 path.display(),
@@ -188,21 +222,14 @@ impl From<&Error> for Diagnostic {
                 path,
                 topics,
                 undefined,
-            } => Diagnostic::new(format!(
-                "{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}",
-                path.display()
-            ))
-            .help(match undefined {
-                Some(kind) => defining(kind),
-                None => format!("{TOPIC} NAME with {FIELD} gyro=PATH names a rate in any message"),
-            }),
-            Error::SeveralImuTopics { path, topics } => Diagnostic::new(format!(
-                "{}: several IMU topics or publishers, and they must not be mixed:{topics}",
-                path.display()
-            ))
-            .help(format!(
-                "{TOPIC} NAME takes one of them, {TOPIC} all each of them"
-            )),
+            } => no_imu_topic(
+                path,
+                &format!("\n  it holds:{topics}"),
+                undefined.as_deref(),
+            ),
+            Error::SeveralImuTopics { path, topics } => {
+                several_imu_topics(path, &format!(":{topics}"))
+            }
             Error::NoSuchTopic {
                 path,
                 topic,

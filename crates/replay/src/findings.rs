@@ -1,9 +1,8 @@
 //! Facts about a log, a run or a live sensor -> findings: how bad, on what evidence, what to do. Pure.
 //!
 //! The one vocabulary: `info`, `check`, `report`, a replay's warnings and the daemon's `STATUS` take their words from
-//! here. Thresholds are opinions; those about the samples themselves lie in [`strapd_attitude::condition::quality`],
-//! those about the replay and the recorded orientation here. A finding's `code` is stable: scripts
-//! match on it.
+//! here. Thresholds are opinions, and lie here too, beside the words; what is counted of the samples for them is in
+//! [`strapd_attitude::condition::quality`]. A finding's `code` is stable: scripts match on it.
 
 mod orientation;
 mod run;
@@ -19,6 +18,19 @@ pub use crate::finding::{Finding, Severity};
 
 use crate::inspection::{Checked, CheckedTopic};
 use strapd_recording::text::named_few;
+
+/// Finding of a log in which no topic of samples could be chosen.
+pub(crate) fn no_topic(why: &strapd_recording::Error) -> Finding {
+    let found = Finding::said(Severity::Error, "no-imu-topic", &why.unlisted());
+    match why {
+        strapd_recording::Error::NoImuTopic {
+            undefined: None, ..
+        } => found
+            .advise("name the topic and where the rate lies in it")
+            .help([TOPIC.to("NAME"), FIELD.to("gyro=PATH")]),
+        _ => found,
+    }
+}
 
 /// Everything worth saying about a log, the worst first; within a severity in order of the flow.
 #[must_use]
@@ -51,19 +63,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
                 ),
         );
     }
-    for why in &checked.refused {
-        let what = why.what().lines().next().unwrap_or_default();
-        let finding = Finding::new(Severity::Error, "no-imu-topic", what);
-        let help = why.helping().unwrap_or_default();
-        found.push(
-            match help.contains(FIELD.to("gyro=PATH").to_string().as_str()) {
-                true => finding
-                    .advise("name the topic and where the rate lies in it")
-                    .help([TOPIC.to("NAME"), FIELD.to("gyro=PATH")]),
-                false => finding.advise(help),
-            },
-        );
-    }
+    found.extend(checked.no_topic.clone());
     if checked.topics.len() > 1 {
         let names: Vec<&str> = checked
             .topics

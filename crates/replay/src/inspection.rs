@@ -2,6 +2,7 @@
 //!
 //! Below the pipeline, which finds it out, and the findings, which judge it.
 
+use crate::finding::Finding;
 use crate::summary::TopicSummary;
 use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::condition::stillness::{self, Rests};
@@ -135,8 +136,8 @@ pub struct Checked {
     pub profile: String,
     /// Origin of attitudes that are no recording.
     pub made_before: Option<MadeBefore>,
-    /// Topics that sound like an IMU's and cannot be decoded: why.
-    pub refused: Vec<Diagnostic>,
+    /// Finding that no topic of samples could be chosen.
+    pub no_topic: Option<Finding>,
     /// Nothing was to correct the attitude that is judged.
     pub is_gyro_alone: bool,
     /// Topics of samples.
@@ -158,7 +159,8 @@ impl Checked {
                 Err(why) => words.extend(why.texts()),
             }
         }
-        words.extend(self.refused.iter_mut().flat_map(Diagnostic::texts));
+        let no_topic = self.no_topic.iter_mut();
+        words.extend(no_topic.flat_map(|found| [&mut found.what, &mut found.advice]));
         words.extend(&mut self.problems);
         for word in words {
             if word.contains(path) {

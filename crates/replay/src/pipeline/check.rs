@@ -10,8 +10,8 @@ use super::position::Position;
 use super::request::ReplayRequest;
 use super::summarise::Told;
 use crate::error::Result;
+use crate::findings::no_topic;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
-use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Plan};
 use strapd_recording::Input;
 use strapd_recording::Recording;
@@ -107,15 +107,9 @@ pub fn examine(
             .channels
             .iter()
             .any(|k| k.role.has_orientation && k.messages > 0);
-    let refused = if looks.topics.is_empty() {
-        // With what it says about channels that only sound like one.
-        log.choose(path, None)
-            .err()
-            .map(|e| Diagnostic::from(&e))
-            .into_iter()
-            .collect()
-    } else {
-        Vec::new()
+    let no_topic = match looks.topics.is_empty() {
+        true => log.choose(path, None).err().as_ref().map(no_topic),
+        false => None,
     };
     let mut looked: Vec<Inspection> = looks
         .topics
@@ -139,7 +133,7 @@ pub fn examine(
         file_size: survey.file_size,
         profile: survey.facts.profile.clone(),
         made_before: log.made_before().filter(|_| named.is_none()),
-        refused,
+        no_topic,
         is_gyro_alone: asked.plan.aid == Aid::None,
         topics,
         left_out: match named {
