@@ -21,7 +21,7 @@ use strapd_recording::format::Format;
 
 /// The name of samples that have none.
 const NAME: &str = "samples";
-/// Their type and encoding.
+/// Type and encoding in the summary.
 const DESCRIBED: &str = "arrays";
 /// Samples between two looks at whether to go on.
 const BLOCK: usize = 4096;
@@ -144,4 +144,83 @@ pub fn so_far(
         finding.topic.clone_from(&summary.topic);
     }
     summary
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+    use std::collections::BTreeSet;
+    use strapd_attitude::estimate::{Aid, at_once};
+    use strapd_attitude::record::Nanos;
+
+    fn keys(value: &Value, at: &str, all: &mut BTreeSet<String>) {
+        for (key, value) in value.as_object().into_iter().flatten() {
+            let at = format!("{at}.{key}");
+            keys(value, &at, all);
+            all.insert(at);
+        }
+    }
+
+    fn keys_of(summary: &TopicSummary) -> BTreeSet<String> {
+        let mut all = BTreeSet::new();
+        keys(&summary.json(), "", &mut all);
+        all
+    }
+
+    /// A steady turn with gravity along z, and a gap of half a second before the last of 300.
+    fn raw() -> Vec<RawSample> {
+        let stamp = |n: i64| 1_700_000_000_000_000_000 + n * 10_000_000 + n / 299 * 500_000_000;
+        (0..300)
+            .map(|n| RawSample {
+                header: Some(Nanos(stamp(n))),
+                log: Nanos(stamp(n)),
+                gyro: Some([0.1, 0.2, 0.3]),
+                accel: Some([0.0, 0.0, 9.81]),
+                ..RawSample::default()
+            })
+            .collect()
+    }
+
+    fn whole(plan: &Plan) -> TopicSummary {
+        estimate(plan, raw().into_iter(), |_| Ok::<(), ()>(())).unwrap()
+    }
+
+    fn live(plan: &Plan) -> TopicSummary {
+        let raw = raw();
+        let meaning = Meaning::new(plan, &Declared::default());
+        let prepared = at_once(plan, &meaning, raw.get(..1).unwrap()).unwrap();
+        let mut estimator = Estimator::live(plan, &meaning, &prepared).unwrap();
+        raw.iter().for_each(|raw| estimator.take(raw));
+        let known = estimator.attitudes(&Sequential);
+        let (written, last) = (known.len() as u64, known.last().copied());
+        so_far(
+            (plan, &meaning, &prepared),
+            &estimator,
+            written,
+            last.as_ref(),
+        )
+    }
+
+    #[test]
+    fn samples_that_still_come_have_every_key_of_a_replay_and_no_other() {
+        let aided = Plan::default();
+        let alone = Plan {
+            aid: Aid::None,
+            ..Plan::default()
+        };
+        assert_eq!(keys_of(&live(&aided)), keys_of(&whole(&aided)));
+        assert_eq!(keys_of(&live(&alone)), keys_of(&whole(&alone)));
+        assert_ne!(keys_of(&live(&alone)), keys_of(&whole(&aided)));
+        let json = live(&aided).json();
+        assert_eq!(json.pointer("/written"), Some(&300.into()));
+        assert_eq!(
+            json.pointer("/aid/learned/mag_hard_iron"),
+            Some(&Value::Null)
+        );
+        // The gap begins with the last sample but one.
+        let at = json.pointer("/gaps/longest_at_s").and_then(Value::as_f64);
+        assert!((at.unwrap() - 2.98).abs() < 1e-9, "{at:?}");
+    }
 }

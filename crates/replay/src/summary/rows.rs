@@ -86,3 +86,38 @@ pub(crate) fn json(rows: Vec<Row>) -> Value {
         .collect();
     Value::Object(pairs)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_is_in_the_text_and_in_the_json_by_being_in_the_list() {
+        let toy = |turns: Option<u32>| {
+            let words = turns.map(|n| format!("{n} whole turns\nof the body"));
+            vec![
+                Row::value("topic", "/imu"),
+                Row::value("whole_turns", turns).told("turns", words),
+                Row::angle("tilt_deg", std::f64::consts::PI),
+                Row::words("note", ["a toy".to_owned()]),
+            ]
+        };
+        let mut out = String::new();
+        text(&toy(Some(3)), &mut out);
+        assert_eq!(
+            out,
+            "  turns    3 whole turns\n           of the body\n  note     a toy\n"
+        );
+        let object = serde_json::json!({ "topic": "/imu", "whole_turns": 3, "tilt_deg": 180.0 });
+        assert_eq!(json(toy(Some(3))), object);
+        // Machines find every key in every run, people no line about what was not there.
+        let mut out = String::new();
+        text(&toy(None), &mut out);
+        assert_eq!(out, "  note     a toy\n");
+        assert!(
+            json(toy(None))
+                .get("whole_turns")
+                .is_some_and(Value::is_null)
+        );
+    }
+}
