@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::pipeline::check::{Examination, examine};
 use crate::pipeline::logged;
 use crate::report::findings::Severity;
-use crate::report::page::Told;
+use crate::report::page::FindingRow;
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -71,9 +71,9 @@ fn one(
 ) -> Result<(String, Outcome)> {
     let input = logged::open(file)?;
     let checked = examine(&input, asked, pool, &mut |_| {})?;
-    let found = Told::all(&checked, &asked.plan);
-    let open = found.iter().filter(|told| told.answered.is_none());
-    let worst = open.map(|told| told.finding.severity).max();
+    let found = FindingRow::all(&checked, &asked.plan);
+    let open = found.iter().filter(|row| row.answered.is_none());
+    let worst = open.map(|row| row.finding.severity).max();
     let text = if global.json {
         let value = json!({
             "file": input.name().display().to_string(),
@@ -92,14 +92,14 @@ fn one(
 }
 
 /// JSON as a program in Python has it, which sets nothing that could deal with a finding.
-fn in_json(told: &Told) -> serde_json::Value {
-    match told.answered {
-        Some(_) => told.json(),
-        None => told.finding.json(),
+fn in_json(row: &FindingRow) -> serde_json::Value {
+    match row.answered {
+        Some(_) => row.json(),
+        None => row.finding.json(),
     }
 }
 
-fn text(file: &Path, checked: &Checked, found: &[Told]) -> String {
+fn text(file: &Path, checked: &Checked, found: &[FindingRow]) -> String {
     let mut out = String::new();
     let topics: Vec<String> = checked
         .topics
@@ -113,8 +113,8 @@ fn text(file: &Path, checked: &Checked, found: &[Told]) -> String {
         })
         .collect();
     let _ = writeln!(out, "{}  {}", file.display(), topics.join(", "));
-    for told in found {
-        let finding = &told.finding;
+    for row in found {
+        let finding = &row.finding;
         let topic = if checked.topics.len() > 1 && !finding.topic.is_empty() {
             format!("{}: ", printable(&finding.topic))
         } else {
@@ -127,7 +127,7 @@ fn text(file: &Path, checked: &Checked, found: &[Told]) -> String {
             finding.code,
             finding.what
         );
-        if let Some(flag) = told.answered {
+        if let Some(flag) = row.answered {
             let _ = writeln!(out, "  {:<31} -> dealt with by {flag}", "");
             continue;
         }
@@ -139,7 +139,7 @@ fn text(file: &Path, checked: &Checked, found: &[Told]) -> String {
         };
         let _ = writeln!(out, "  {:<31} -> {advice}", "");
     }
-    let count = |severity| found.iter().filter(|told| told.is_open(severity)).count();
+    let count = |severity| found.iter().filter(|row| row.is_open(severity)).count();
     let _ = writeln!(
         out,
         "{}",

@@ -9,7 +9,7 @@ use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{Drawing, Examination, examine};
 use crate::pipeline::logged;
 use crate::pipeline::provenance::sha256;
-use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Several, Told, longest_rest};
+use crate::report::page::{DRAWN, FindingRow, Noise, Page, STRETCHES, Several, longest_rest};
 use crate::report::summary::{human_bytes, significant};
 use crate::sink::Document;
 use clap::Args;
@@ -207,7 +207,7 @@ impl Report {
                 (None, "") => String::new(),
                 (None, topic) => format!("the orientation on {topic}"),
             },
-            findings: Told::all(&checked, &asked.plan),
+            findings: FindingRow::all(&checked, &asked.plan),
             noise: checked
                 .topics
                 .iter()

@@ -15,7 +15,7 @@ mod timeline;
 mod topic;
 mod verdict;
 
-pub use findings::Told;
+pub use findings::FindingRow;
 pub use numbers::{comparison_json, longest_rest};
 pub use several::Several;
 
@@ -84,7 +84,7 @@ pub struct Page<'a> {
     /// Results of checking it.
     pub checked: &'a Checked,
     /// Findings of `check` about it.
-    pub findings: Vec<Told>,
+    pub findings: Vec<FindingRow>,
     /// Noise by topic.
     pub noise: Vec<Noise>,
 }
@@ -152,7 +152,7 @@ impl Page<'_> {
             "verdict": { "level": verdict.level.name(), "text": verdict.text },
             "file_problems": self.checked.problems,
             "file_losses": self.checked.file_losses,
-            "findings": self.findings.iter().map(Told::json).collect::<Vec<_>>(),
+            "findings": self.findings.iter().map(FindingRow::json).collect::<Vec<_>>(),
             "reference": self.reference,
             "topics": topics.map(|(i, t)| numbers::topic(t, self.noise.get(i))).collect::<Vec<_>>(),
             "lossy": self.is_lossy(),

@@ -12,22 +12,22 @@ const SHOWN: usize = 200;
 
 /// A finding, and the flag of this run that deals with it already.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Told {
+pub struct FindingRow {
     /// Finding.
     pub finding: Finding,
     /// The flag; `None` = nothing was done about it.
     pub answered: Option<&'static str>,
 }
 
-impl Told {
+impl FindingRow {
     /// Everything that is found about a log examined by `plan`.
     #[must_use]
-    pub fn all(checked: &Checked, plan: &Plan) -> Vec<Told> {
-        let told = |finding: Finding| Told {
+    pub fn all(checked: &Checked, plan: &Plan) -> Vec<FindingRow> {
+        let row = |finding: Finding| FindingRow {
             answered: answered(finding.code, plan),
             finding,
         };
-        findings(checked).into_iter().map(told).collect()
+        findings(checked).into_iter().map(row).collect()
     }
 
     /// Whether it is as bad as `severity`, and nothing was done about it.
@@ -62,20 +62,20 @@ fn answered(code: &str, plan: &Plan) -> Option<&'static str> {
     is_given.then_some(flag)
 }
 
-pub(super) fn section(told: &[Told], out: &mut String) {
+pub(super) fn section(rows: &[FindingRow], out: &mut String) {
     out.push_str("<section id=\"findings\"><h2>Quality of the input</h2>\n");
-    if told.is_empty() {
+    if rows.is_empty() {
         out.push_str("<p>Nothing was found.</p>\n");
     }
-    let topics = |told: &[Told]| {
-        let mut names: Vec<&str> = told.iter().map(|t| t.finding.topic.as_str()).collect();
+    let topics = |rows: &[FindingRow]| {
+        let mut names: Vec<&str> = rows.iter().map(|t| t.finding.topic.as_str()).collect();
         names.retain(|name| !name.is_empty());
         names.sort_unstable();
         names.dedup();
         names.len()
     };
-    let several = topics(told) > 1;
-    for one in told.iter().take(SHOWN) {
+    let several = topics(rows) > 1;
+    for one in rows.iter().take(SHOWN) {
         let finding = &one.finding;
         let answered = one.answered.map_or("", |_| " answered");
         let _ = write!(
@@ -116,11 +116,11 @@ pub(super) fn section(told: &[Told], out: &mut String) {
         }
         out.push_str("</div>\n");
     }
-    if told.len() > SHOWN {
+    if rows.len() > SHOWN {
         let _ = writeln!(
             out,
             "<p>And {} more; all are in the JSON block.</p>",
-            told.len() - SHOWN
+            rows.len() - SHOWN
         );
     }
     out.push_str("</section>\n");

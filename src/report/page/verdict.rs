@@ -1,6 +1,6 @@
 //! Everything known -> one sentence. Pure.
 
-use super::findings::Told;
+use super::findings::FindingRow;
 use super::markup::sentence;
 use crate::report::calendar::duration;
 use crate::report::findings::Severity;
@@ -44,8 +44,8 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    pub(super) fn of(checked: &Checked, told: &[Told]) -> Verdict {
-        let count = |severity| told.iter().filter(|t| t.is_open(severity)).count();
+    pub(super) fn of(checked: &Checked, rows: &[FindingRow]) -> Verdict {
+        let count = |severity| rows.iter().filter(|t| t.is_open(severity)).count();
         let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
         let runs = || {
             checked
@@ -64,10 +64,10 @@ impl Verdict {
             (_, _, 1..) => Level::Warning,
             _ => Level::Good,
         };
-        let worst = told
+        let worst = rows
             .iter()
             .find(|t| t.is_open(Severity::Error))
-            .or_else(|| told.iter().find(|t| t.is_open(Severity::Warning)))
+            .or_else(|| rows.iter().find(|t| t.is_open(Severity::Warning)))
             .map(|t| match t.finding.topic.as_str() {
                 topic if checked.topics.len() > 1 && !topic.is_empty() => {
                     format!("{topic}: {}", t.finding.what)
@@ -83,7 +83,7 @@ impl Verdict {
             };
         };
         // What does not follow the gyro says nothing about how well the gyro was followed.
-        let trusted = !told
+        let trusted = !rows
             .iter()
             .any(|t| t.finding.topic == best.topic && t.finding.code.starts_with("orientation-"));
         let wrong = match (errors, warnings, worst) {
