@@ -3,7 +3,7 @@
 use super::charts::{self, Time};
 use super::markup::{Rows, escaped, figure, table};
 use super::{Noise, Page, numbers, reference, timeline};
-use crate::report::aid::Aided;
+use crate::report::aid::FilterSummary;
 use crate::report::series::Drawn;
 use crate::report::smoothing::Smoothing;
 use crate::report::summary::{TopicSummary, significant};
@@ -96,7 +96,7 @@ fn integrated(s: &TopicSummary, is_damaged: bool, stretches: Option<usize>, out:
     }));
     if let Some(smoothing) = s.smoothing() {
         smoothed(smoothing, s.drawn.as_deref(), out);
-    } else if let Some(learned) = s.aided.as_ref().and_then(Aided::learned) {
+    } else if let Some(learned) = s.aided.as_ref().and_then(FilterSummary::learned) {
         out.push_str("<h3>Calibration learned on the way</h3>\n");
         let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
         out.push_str(&table("numbers", &head, &learned));

@@ -10,7 +10,7 @@ use strapd_attitude::setting::{AID, BIAS, NOISE};
 
 /// The filter at the end of a run.
 #[derive(Clone, Copy, Debug)]
-pub struct Aided {
+pub struct FilterSummary {
     started: bool,
     has_field: bool,
     is_implausible: bool,
@@ -34,11 +34,11 @@ pub(crate) struct Frozen {
 /// Parts in a million.
 const PPM: f64 = 1e6;
 
-impl Aided {
+impl FilterSummary {
     /// Makes it of `filter` as it is now.
     #[must_use]
-    pub fn of(filter: &Filter) -> Aided {
-        Aided {
+    pub fn of(filter: &Filter) -> FilterSummary {
+        FilterSummary {
             started: filter.is_started(),
             has_field: filter.has_field(),
             is_implausible: filter.is_force_implausible(),

@@ -4,7 +4,7 @@
 //! JSON, page and Python are made.
 
 use super::against::{Against, Recorded, against_text};
-use super::aid::Aided;
+use super::aid::FilterSummary;
 use super::gaps::Gaps;
 use super::rows::{self, Row};
 use super::series::Drawn;
@@ -70,7 +70,7 @@ pub struct TopicSummary {
     /// Origin of the bias, with its sigma if it was estimated.
     pub bias_origin: String,
     /// Account of what corrected the attitude, if something did.
-    pub aided: Option<Aided>,
+    pub aided: Option<FilterSummary>,
     /// Result of a smoother, if one was asked for, or why there is none: then the attitude is that of `aided`.
     pub smoothed: Option<Result<Smoothing, Diagnostic>>,
     /// Calibration of the sensor at the end.
@@ -155,7 +155,7 @@ impl TopicSummary {
             bias: prepared.bias.into(),
             bias_sigma: prepared.bias_sigma.into(),
             bias_origin: prepared.bias_origin.clone(),
-            aided: estimator.filter().map(Aided::of),
+            aided: estimator.filter().map(FilterSummary::of),
             smoothed,
             calibration: learned((plan, resolved, prepared), estimator.filter(), recording),
             noise: plan.noise.name.clone(),
@@ -226,7 +226,7 @@ impl TopicSummary {
             Row::value("initial", self.initial.as_str()).told("frames", [self.frames_text()]),
             Row::value("smooth", self.smoothed.as_ref().map(smoothed_json))
                 .told("smooth", self.not_smoothed()),
-            Row::value("aid", self.aided.as_ref().map(Aided::json))
+            Row::value("aid", self.aided.as_ref().map(FilterSummary::json))
                 .told(corrector, corrected.into_iter().filter_map(seen)),
             Row::value("bias_rad_s", self.bias_json()).told("bias", seen(self.bias_text())),
             Row::value("bias_sigma_rad_s", self.bias_sigma.as_slice()),

@@ -2,7 +2,7 @@
 //!
 //! A copy: the run itself may be waiting for its time, or for somebody to go on.
 
-use crate::report::aid::Aided;
+use crate::report::aid::FilterSummary;
 use crate::serve::core::stream::attitude_now::attitude_now;
 use serde_json::{Map, Value, json};
 use strapd_attitude::aid::Filter;
@@ -49,7 +49,7 @@ impl Health {
             "not_bridged": self.not_bridged,
             "rate_hz": rate_hz(self.spacing_nanos),
             "method": self.method.name(),
-            "aid": filter.map(|filter| Aided::of(filter).json()),
+            "aid": filter.map(|filter| FilterSummary::of(filter).json()),
             "attitude": attitude_now(filter, last),
         });
         if let (Some(fields), Value::Object(own)) = (fields.as_object_mut(), own) {
