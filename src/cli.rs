@@ -14,10 +14,10 @@ mod continued;
 pub mod estimation;
 pub mod info;
 mod known_words;
-mod made_before;
 pub mod manual;
 pub mod model;
 pub mod outputs;
+mod own_output;
 #[cfg(feature = "object-store")]
 mod patterns;
 pub mod progress;

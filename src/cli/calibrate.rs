@@ -5,7 +5,7 @@ use super::estimation::{AidArg, Estimation};
 use super::outputs::shown;
 use super::progress::Reporter;
 use super::tables::Tables;
-use super::{Global, Outcome, made_before, print};
+use super::{Global, Outcome, own_output, print};
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
 use crate::pipeline::request::ReplayRequest;
@@ -56,7 +56,7 @@ pub struct Calibrate {
 /// [`Error::Usage`]; with one log whatever ended it. With several the rest still run, and each failure is said; none is
 /// left: the last one.
 pub fn run(global: &Global, mut args: Calibrate) -> Result<Outcome> {
-    args.logs = made_before::without(args.logs, args.estimation.topic.as_deref())?;
+    args.logs = own_output::without(args.logs, args.estimation.topic.as_deref())?;
     let args = &args;
     args.check(global)?;
     let plan = args.estimation.plan_of_a_recording(true)?;

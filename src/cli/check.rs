@@ -2,7 +2,7 @@
 
 use super::estimation::Estimation;
 use super::tables::Tables;
-use super::{Global, Outcome, made_before, print, with_each};
+use super::{Global, Outcome, own_output, print, with_each};
 use crate::error::Result;
 use crate::pipeline::check::{Examination, examine};
 use crate::pipeline::logged;
@@ -54,7 +54,7 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
         command: "strapd check".to_owned(),
     };
     let mut between = "";
-    let files = made_before::without(args.files.clone(), args.estimation.topic.as_deref())?;
+    let files = own_output::without(args.files.clone(), args.estimation.topic.as_deref())?;
     with_each(&files, |file| {
         let (text, outcome) = one(global, file, &asked, &pool)?;
         print(&format!("{between}{text}"))?;

@@ -4,7 +4,7 @@ use super::calibration_files;
 use super::continued;
 use super::estimation::{AidArg, Estimation};
 use super::known_words;
-use super::made_before;
+use super::own_output;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::tables::Tables;
@@ -160,7 +160,7 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
 /// With one log, whatever ended it. With several, the rest still run; each failure is said.
 pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
     let is_of_one = args.sources.len() == 1;
-    args.sources = made_before::without(args.sources, args.estimation.topic.as_deref())?;
+    args.sources = own_output::without(args.sources, args.estimation.topic.as_deref())?;
     let args = &args;
     let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
     if args.join && shard.is_some() {

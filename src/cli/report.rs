@@ -3,7 +3,7 @@
 use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::tables::Tables;
-use super::{Global, Outcome, allan, made_before, print, with_each};
+use super::{Global, Outcome, allan, own_output, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{Drawing, Examination, examine};
@@ -73,7 +73,7 @@ pub struct Report {
 /// A file cannot be read, the page exists, or the topic named is not in the log. What is wrong with
 /// the samples is no error: the page says it.
 pub fn run(global: &Global, mut args: Report) -> Result<Outcome> {
-    args.files = made_before::without(args.files, args.estimation.topic.as_deref())?;
+    args.files = own_output::without(args.files, args.estimation.topic.as_deref())?;
     let args = &args;
     let output = args.output.as_deref();
     match output {
