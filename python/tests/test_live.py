@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import pathlib
+from typing import Any
+
 import numpy as np
 import pytest
 import strapd
-from conftest import turning
+from conftest import say, turning
 
 T, GYR, ACC = turning(300)
 T += 10**9
@@ -88,3 +92,25 @@ def test_a_finished_estimator_is_closed() -> None:
 def test_a_live_sensor_can_not_be_smoothed() -> None:
     with pytest.raises(ValueError, match=r"smooth: only a whole recording can be smoothed(.|\n)*estimate"):
         strapd.Estimator(smooth=True, method="auto")
+
+
+def keys(of: dict[str, Any]) -> dict[str, Any]:
+    """The names alone, nested as they are."""
+    return {name: keys(value) if isinstance(value, dict) else None for name, value in of.items()}
+
+
+def test_what_is_known_live_has_the_names_of_a_replay(command: str, tmp_path: pathlib.Path) -> None:
+    table = tmp_path / "samples.csv"
+    rows = np.column_stack([T, GYR, ACC]).tolist()
+    lines = [",".join([str(int(t)), *map(repr, values)]) for t, *values in rows]
+    table.write_text("stamp_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + "\n".join(lines) + "\n")
+    said = json.loads(say(command, "replay", table, "--json", "--quiet", "-o", "null:"))["topics"][0]
+    est = strapd.Estimator()
+    est.push(GYR, ACC, t=T)
+    live, whole = est.summary, strapd.estimate(GYR, ACC, t=T).summary
+    for summary in (live, whole):
+        # A file has it in a file of its own (`--save-calibration`).
+        assert summary.pop("calibration") is not None
+        assert keys(summary) == keys(said)
+    assert live["written"] == 300 and live["aid"]["learned"]["mag_hard_iron"] is None
+    assert live["gaps"] == whole["gaps"]
