@@ -205,9 +205,9 @@ mod tests {
 
     #[test]
     fn samples_that_still_come_have_every_key_of_a_replay_and_no_other() {
-        let aided = Plan::default();
-        let alone = Plan {
-            aid: Aid::None,
+        let alone = Plan::default();
+        let aided = Plan {
+            aid: Aid::Auto,
             ..Plan::default()
         };
         assert_eq!(keys_of(&live(&aided)), keys_of(&whole(&aided)));
