@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use serde_json::Value;
     use std::collections::BTreeSet;
-    use strapd_attitude::estimate::{Aid, at_once};
+    use strapd_attitude::estimate::{Aid, Truncation, at_once};
     use strapd_attitude::record::Nanos;
 
     fn keys(value: &Value, at: &str, all: &mut BTreeSet<String>) {
@@ -213,7 +213,14 @@ mod tests {
         assert_eq!(keys_of(&live(&aided)), keys_of(&whole(&aided)));
         assert_eq!(keys_of(&live(&alone)), keys_of(&whole(&alone)));
         assert_ne!(keys_of(&live(&alone)), keys_of(&whole(&aided)));
+        let cut = Plan {
+            truncation: Truncation::Steps(0.001),
+            ..aided.clone()
+        };
+        let step = live(&cut).json()["truncation_step_rad_s"].as_f64();
+        assert_eq!(step, Some(0.001));
         let json = live(&aided).json();
+        assert!(json["truncation_step_rad_s"].is_null());
         assert_eq!(json.pointer("/written"), Some(&300.into()));
         assert_eq!(
             json.pointer("/aid/learned/mag_hard_iron"),

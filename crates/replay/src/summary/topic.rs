@@ -69,6 +69,8 @@ pub struct TopicSummary {
     pub bias_sigma: [f64; 3],
     /// Origin of the bias, with its sigma if it was estimated.
     pub bias_origin: String,
+    /// Step in which the driver cut the rates, rad/s, where half of it was put back.
+    pub truncation_step: Option<f64>,
     /// Account of what corrected the attitude, if something did.
     pub aided: Option<FilterSummary>,
     /// Result of a smoother, if one was asked for, or why there is none: then the attitude is that of `aided`.
@@ -155,6 +157,7 @@ impl TopicSummary {
             bias: prepared.bias.into(),
             bias_sigma: prepared.bias_sigma.into(),
             bias_origin: prepared.bias_origin.clone(),
+            truncation_step: prepared.truncation_step,
             aided: estimator.filter().map(FilterSummary::of),
             smoothed,
             calibration: learned((plan, resolved, prepared), estimator.filter(), recording),
@@ -230,6 +233,7 @@ impl TopicSummary {
                 .told(corrector, corrected.into_iter().filter_map(seen)),
             Row::value("bias_rad_s", self.bias_json()).told("bias", seen(self.bias_text())),
             Row::value("bias_sigma_rad_s", self.bias_sigma.as_slice()),
+            Row::value("truncation_step_rad_s", self.truncation_step),
             Row::value("earth_rate", self.latitude_deg.map(earth_json))
                 .told("earth", self.latitude_deg.map(earth_text).and_then(seen)),
             Row::angle("turned_deg", self.turned).told("turned", seen(self.turned_text())),
