@@ -77,12 +77,18 @@ pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
 /// The same where a run has counted what became of them.
 pub(super) fn of_counted(looked: &Inspection, counts: &Counts) -> Vec<Finding> {
     let mut out = verdicts::find(counts);
-    let seen = Seen::of(looked, counts.total());
-    RULES.iter().for_each(|rule| rule(&seen, &mut out));
+    out.extend(found_by(&RULES, &Seen::of(looked, counts.total())));
     // What nobody takes unasked spoils nothing.
     if !looked.is_likely {
         out.iter_mut().for_each(|f| f.severity = Severity::Note);
     }
+    out
+}
+
+/// Findings of these rules, in their order.
+fn found_by(rules: &[Rule], seen: &Seen<'_>) -> Vec<Finding> {
+    let mut out = Vec::new();
+    rules.iter().for_each(|rule| rule(seen, &mut out));
     out
 }
 

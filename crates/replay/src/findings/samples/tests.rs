@@ -1,8 +1,8 @@
 //! Samples whose properties are known -> the findings about them, and no others.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing)]
 
-use super::of_samples;
-use crate::finding::Finding;
+use super::{Seen, found_by, of_samples};
+use crate::finding::{Finding, Severity};
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::{GravityAxis, Quality};
 use strapd_attitude::condition::{Clock, GyroUnit};
@@ -224,4 +224,19 @@ fn exact_data_is_neither_clipped_nor_stuck_nor_short_of_samples() {
     for wrong in ["saturated", "stuck", "missing"] {
         assert!(!codes(&found).contains(&wrong), "{found:?}");
     }
+}
+
+#[test]
+fn a_finding_is_a_row_of_the_table() {
+    fn toy(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+        let n = seen.looked.quality.with_accel;
+        if n > 0 {
+            out.push(Finding::new(Severity::Note, "toy", "forces").with("count", n));
+        }
+    }
+    let looked = looked(&(0..20).map(sample).collect::<Vec<_>>());
+    let seen = Seen::of(&looked, 20);
+    let [found] = found_by(&[toy], &seen).try_into().unwrap();
+    assert_eq!((found.code, &found.evidence["count"]), ("toy", &20.into()));
+    assert_eq!(found_by(&[], &seen), []);
 }
