@@ -62,7 +62,9 @@ impl Rows {
     }
 
     pub(super) fn html(&self) -> String {
-        format!("<table class=\"facts\">\n{}</table>\n", self.0)
+        // A row that goes on from the one above has no name.
+        let rows = self.0.replace("<th></th>", "<td></td>");
+        format!("<table class=\"facts\">\n{rows}</table>\n")
     }
 }
 
