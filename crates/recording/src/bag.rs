@@ -17,4 +17,4 @@ pub(crate) use record::{Head, chunk_at, head, op};
 pub(crate) use transcribe::{connection, next_record, transcribe};
 
 /// The first line of a bag.
-pub(crate) use crate::format::BAG_MAGIC as MAGIC;
+pub(crate) const MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";

@@ -3,13 +3,11 @@
 //! Apart from the readers because it comes before all of them: files are called whatever somebody called them, and a
 //! pipe has no name. What the bytes say wins over what the name says.
 
-use crate::delimited;
 use crate::error::{Error, Result};
-use crate::gpmf;
-use crate::mavlink;
-use crate::parquet;
-use crate::recognise;
+use crate::records::MAGIC;
+use crate::records::transcript::Transcribe;
 use crate::text::without_mark;
+use crate::{bag, delimited, gpmf, mavlink, parquet, recognise, sqlite, ulog};
 use std::fs::File;
 use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -36,65 +34,171 @@ pub enum Format {
     Table,
     /// The same rows stored by columns, in Parquet.
     Parquet,
+    /// Format of this table's test.
+    #[cfg(test)]
+    Toy,
 }
 
-/// The eight bytes at both ends of an MCAP.
-pub const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-/// The first bytes of a ULog.
-pub(crate) const ULOG_MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
-/// The first bytes of a bag of ROS 1.
-pub(crate) const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
-/// The first bytes of an SQLite database.
-pub(crate) const SQLITE_MAGIC: [u8; 16] = *b"SQLite format 3\0";
+/// Reading of a format: who cuts its bytes into what.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Reading {
+    /// Objects, one a line.
+    Lines,
+    /// Rows of text under names.
+    Rows,
+    /// The same rows, stored by columns.
+    Columns,
+    /// Records of MCAP.
+    Records,
+    /// Records of a ROS 1 bag.
+    Bag,
+    /// Pages of SQLite.
+    Database,
+    /// Payloads of a camera, which an index may tell of.
+    Telemetry,
+    /// From its front to its end, transcribed to records by what this makes.
+    Transcribed(fn() -> Box<dyn Transcribe>),
+}
 
-/// Bytes that tell a format by themselves, at the beginning.
-const MAGICS: [(&[u8], Format); 6] = [
-    (&MCAP_MAGIC, Format::Mcap),
-    (&ULOG_MAGIC, Format::Ulog),
-    (&BAG_MAGIC, Format::Bag),
-    (&SQLITE_MAGIC, Format::Rosbag2),
-    (&gpmf::MAGIC, Format::Gpmf),
-    (&parquet::MAGIC, Format::Parquet),
+/// Facts of a format: all that the house knows of one before it is read.
+#[derive(Debug)]
+struct Row {
+    format: Format,
+    /// Name, as people call it.
+    name: &'static str,
+    /// First bytes that tell it by themselves; none where there are none.
+    magic: &'static [u8],
+    /// Whether it looks like this format, where no magic tells.
+    looks_like: fn(&[u8]) -> bool,
+    /// Whether more bytes could make it look so.
+    may_look_like: fn(&[u8]) -> bool,
+    /// Endings of names, for what the bytes do not tell.
+    endings: &'static [&'static str],
+    /// Whether it is read in another order than that of its bytes.
+    is_read_anywhere: bool,
+    reading: Reading,
+}
+
+/// Row of a log of records: what a row below leaves out.
+const LOG: Row = Row {
+    format: Format::Mcap,
+    name: "MCAP",
+    magic: &MAGIC,
+    looks_like: never,
+    may_look_like: never,
+    endings: &["mcap"],
+    is_read_anywhere: false,
+    reading: Reading::Records,
+};
+
+/// The formats, in the order in which texts list them.
+const ROWS: &[Row] = &[
+    LOG,
+    Row {
+        format: Format::Ulog,
+        name: "ULog",
+        magic: &ulog::MAGIC,
+        endings: &["ulg", "ulog"],
+        reading: Reading::Transcribed(|| Box::new(ulog::Transcriber::default())),
+        ..LOG
+    },
+    Row {
+        format: Format::Bag,
+        name: "ROS 1 bag",
+        magic: &bag::MAGIC,
+        endings: &["bag"],
+        reading: Reading::Bag,
+        ..LOG
+    },
+    Row {
+        format: Format::Rosbag2,
+        name: "rosbag2 SQLite",
+        magic: &sqlite::MAGIC,
+        endings: &["db3"],
+        is_read_anywhere: true,
+        reading: Reading::Database,
+        ..LOG
+    },
+    Row {
+        format: Format::Gpmf,
+        name: "GPMF",
+        magic: &gpmf::MAGIC,
+        // Whether it has telemetry shows when it is opened.
+        looks_like: is_video,
+        endings: &[],
+        is_read_anywhere: true,
+        reading: Reading::Telemetry,
+        ..LOG
+    },
+    Row {
+        format: Format::Tlog,
+        name: "MAVLink tlog",
+        magic: &[],
+        looks_like: mavlink::is_log,
+        may_look_like: mavlink::may_be_log,
+        endings: &["tlog"],
+        reading: Reading::Transcribed(|| Box::new(mavlink::Transcriber::default())),
+        ..LOG
+    },
+    Row {
+        format: Format::Lines,
+        name: "NDJSON",
+        magic: &[],
+        looks_like: is_lines,
+        endings: &["ndjson", "jsonl"],
+        reading: Reading::Lines,
+        ..LOG
+    },
+    Row {
+        format: Format::Table,
+        name: "CSV",
+        magic: &[],
+        looks_like: is_rows,
+        endings: &["csv", "tsv", "gcsv"],
+        reading: Reading::Rows,
+        ..LOG
+    },
+    Row {
+        format: Format::Parquet,
+        name: "Parquet",
+        magic: &parquet::MAGIC,
+        endings: &["parquet"],
+        is_read_anywhere: true,
+        reading: Reading::Columns,
+        ..LOG
+    },
+    #[cfg(test)]
+    tests::TOY,
 ];
+
+/// Length of the longest magic.
+pub(crate) const LONGEST_MAGIC: usize = {
+    let (mut longest, mut at) = (0, 0);
+    while at < ROWS.len() {
+        if ROWS[at].magic.len() > longest {
+            longest = ROWS[at].magic.len();
+        }
+        at += 1;
+    }
+    longest
+};
 
 /// Mark of a video, behind four bytes.
 const VIDEO: &[u8] = b"ftyp";
-
-/// The longest of them.
-pub(crate) const LONGEST_MAGIC: usize = SQLITE_MAGIC.len();
-
-/// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 12] = [
-    ("mcap", Format::Mcap),
-    ("ulg", Format::Ulog),
-    ("ulog", Format::Ulog),
-    ("bag", Format::Bag),
-    ("db3", Format::Rosbag2),
-    ("tlog", Format::Tlog),
-    ("ndjson", Format::Lines),
-    ("jsonl", Format::Lines),
-    ("csv", Format::Table),
-    ("tsv", Format::Table),
-    ("gcsv", Format::Table),
-    ("parquet", Format::Parquet),
-];
 
 /// Bytes that are looked at: the first line of a table is shorter.
 pub(crate) const HEAD: usize = 4096;
 
 impl Format {
     /// The formats that are read, in the order in which texts list them.
-    pub const ALL: [Format; 9] = [
-        Format::Mcap,
-        Format::Ulog,
-        Format::Bag,
-        Format::Rosbag2,
-        Format::Gpmf,
-        Format::Tlog,
-        Format::Lines,
-        Format::Table,
-        Format::Parquet,
-    ];
+    pub const ALL: [Format; ROWS.len()] = {
+        let (mut all, mut at) = ([Format::Mcap; ROWS.len()], 0);
+        while at < ROWS.len() {
+            all[at] = ROWS[at].format;
+            at += 1;
+        }
+        all
+    };
 
     /// The names of [`Format::ALL`], separated by commas: the list of every help text and message.
     #[must_use]
@@ -102,80 +206,63 @@ impl Format {
         Format::ALL.map(Format::name).join(", ")
     }
 
+    fn row(self) -> &'static Row {
+        let mut rows = ROWS.iter();
+        rows.find(|row| row.format == self).unwrap_or(&LOG)
+    }
+
     /// Name of the format, as people call it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Format::Mcap => "MCAP",
-            Format::Ulog => "ULog",
-            Format::Bag => "ROS 1 bag",
-            Format::Rosbag2 => "rosbag2 SQLite",
-            Format::Gpmf => "GPMF",
-            Format::Tlog => "MAVLink tlog",
-            Format::Lines => "NDJSON",
-            Format::Table => "CSV",
-            Format::Parquet => "Parquet",
-        }
+        self.row().name
+    }
+
+    /// Who cuts it into what.
+    pub(crate) fn reading(self) -> Reading {
+        self.row().reading
     }
 
     /// Whether it is read as text, lines or rows; everything else is a log of messages on channels.
     #[must_use]
     pub fn is_text(self) -> bool {
-        self == Format::Lines || self.is_table()
+        matches!(self.reading(), Reading::Lines) || self.is_table()
     }
 
     /// Whether it is rows under names.
     #[must_use]
     pub fn is_table(self) -> bool {
-        matches!(self, Format::Table | Format::Parquet)
+        matches!(self.reading(), Reading::Rows | Reading::Columns)
     }
 
     /// The log of messages on channels of which these are the first bytes.
     #[must_use]
-    pub(crate) fn of_magic(head: &[u8]) -> Option<Format> {
-        let mut known = MAGICS.iter();
-        known
-            .find(|(magic, _)| head.starts_with(magic))
-            .map(|(_, format)| *format)
-            // Whether it has telemetry shows when it is opened.
-            .or_else(|| is_video(head).then_some(Format::Gpmf))
-            .or_else(|| mavlink::is_log(head).then_some(Format::Tlog))
+    pub(crate) fn of_log(head: &[u8]) -> Option<Format> {
+        Format::of_bytes(head).filter(|format| !format.is_text())
     }
 
-    /// Whether more bytes behind these could make one of [`Format::of_magic`].
+    /// Whether more bytes behind these could make one of [`Format::of_log`].
     #[must_use]
-    pub(crate) fn may_be_magic(head: &[u8]) -> bool {
-        let mut known = MAGICS.iter();
-        known.any(|(magic, _)| magic.len() > head.len() && magic.starts_with(head))
-            || mavlink::may_be_log(head)
+    pub(crate) fn may_be_log(head: &[u8]) -> bool {
+        ROWS.iter().any(|row| {
+            let is_part = row.magic.len() > head.len() && row.magic.starts_with(head);
+            is_part || (row.may_look_like)(head)
+        })
     }
 
     /// Whether it is read in another order than that of its bytes, so that a stream of it is first put into a file.
     #[must_use]
     pub fn is_read_anywhere(self) -> bool {
-        matches!(self, Format::Rosbag2 | Format::Gpmf | Format::Parquet)
+        self.row().is_read_anywhere
     }
 
     /// The format of which these are the first bytes; `None` where they tell nothing.
     #[must_use]
     pub fn of_bytes(head: &[u8]) -> Option<Format> {
-        if let Some(format) = Format::of_magic(head) {
-            return Some(format);
-        }
-        let text = without_mark(head).trim_ascii_start();
-        if matches!(text.first(), Some(b'{' | b'[')) {
-            return Some(Format::Lines);
-        }
-        let is_cut = head.len() >= HEAD && !text.ends_with(b"\n");
-        let mut lines = text.split(|b| *b == b'\n');
-        if is_cut {
-            lines.next_back();
-        }
-        let is_table = delimited::may_be_table(text)
-            && lines
-                .take(delimited::MOST_HEAD_LINES)
-                .any(|line| delimited::is_header(line, None));
-        is_table.then_some(Format::Table)
+        let is_marked = |row: &&Row| !row.magic.is_empty() && head.starts_with(row.magic);
+        let looks_so = |row: &&Row| (row.looks_like)(head);
+        let mut rows = ROWS.iter();
+        let found = rows.find(is_marked).or_else(|| ROWS.iter().find(looks_so));
+        found.map(|row| row.format)
     }
 
     /// The format that bytes look like, where neither they nor the name say more: text in cells, whose columns the user
@@ -189,10 +276,11 @@ impl Format {
     #[must_use]
     pub fn of_name(path: &Path) -> Option<Format> {
         let ending = path.extension()?;
-        let mut known = ENDINGS.iter();
-        known
-            .find(|(known, _)| ending.eq_ignore_ascii_case(known))
-            .map(|(_, format)| *format)
+        let has = |row: &&Row| {
+            let mut known = row.endings.iter();
+            known.any(|known| ending.eq_ignore_ascii_case(known))
+        };
+        ROWS.iter().find(has).map(|row| row.format)
     }
 
     /// The format of a regular file: by its first bytes, and where these tell nothing by its name.
@@ -261,6 +349,30 @@ pub(crate) fn is_video(head: &[u8]) -> bool {
     head.get(4..8) == Some(VIDEO)
 }
 
+fn never(_: &[u8]) -> bool {
+    false
+}
+
+/// Whether it begins like an object or a list of them.
+fn is_lines(head: &[u8]) -> bool {
+    let text = without_mark(head).trim_ascii_start();
+    matches!(text.first(), Some(b'{' | b'['))
+}
+
+/// Whether it begins with a header, perhaps behind other lines.
+fn is_rows(head: &[u8]) -> bool {
+    let text = without_mark(head).trim_ascii_start();
+    let is_cut = head.len() >= HEAD && !text.ends_with(b"\n");
+    let mut lines = text.split(|b| *b == b'\n');
+    if is_cut {
+        lines.next_back();
+    }
+    delimited::may_be_table(text)
+        && lines
+            .take(delimited::MOST_HEAD_LINES)
+            .any(|line| delimited::is_header(line, None))
+}
+
 /// Whether a video has a track of telemetry, or may have had one and is cut.
 fn has_telemetry(file: &mut (impl Read + Seek), length: u64) -> std::io::Result<bool> {
     let index = gpmf::index(length, &mut |at, into| {
@@ -310,7 +422,7 @@ fn tells_enough(head: &[u8]) -> bool {
     let lines = text
         .get(..whole.map_or(0, |end| end + 1))
         .unwrap_or_default();
-    !Format::may_be_magic(head)
+    !Format::may_be_log(head)
         && (Format::of_bytes(head).is_some()
             || (!lines.is_empty() && !delimited::may_be_table(lines)))
 }
@@ -338,3 +450,6 @@ pub fn open(path: &Path) -> Result<File> {
     }
     Ok(file)
 }
+
+#[cfg(test)]
+mod tests;

@@ -15,4 +15,4 @@ mod message;
 mod transcriber;
 
 pub(crate) use frame::{is_log, may_be_log};
-pub(crate) use transcriber::{Fault, FaultKind, Transcriber};
+pub(crate) use transcriber::Transcriber;

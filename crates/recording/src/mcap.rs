@@ -28,7 +28,6 @@ mod list;
 mod lz4;
 mod messages;
 mod order;
-mod problem;
 mod record;
 mod resync;
 mod scan;
@@ -37,13 +36,13 @@ mod survey;
 mod walk;
 mod workers;
 
+pub use crate::problem::{Problem, ProblemKind, Problems};
 pub use block::Compression;
 use block::Payload;
 pub use channels::{Channel, Schema};
 pub use list::{Listed, list};
 pub use messages::{Message, Tally};
 pub use order::{Lookahead, Order};
-pub use problem::{Problem, ProblemKind, Problems};
 pub use record::{
     AttachmentIndex, AttachmentRecord, ChannelRecord, ChunkHead, ChunkIndex, Footer, MAGIC,
     MessageRecord, Record, SchemaRecord, Statistics, op,
@@ -55,7 +54,7 @@ pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::elsewhere::{self, Object};
 use crate::error::{Error, Result};
-use crate::format::{Format, LONGEST_MAGIC, is_video};
+use crate::format::{Format, LONGEST_MAGIC, Reading, is_video};
 use crate::recognise::{self, Foreign};
 use index::Index;
 use input::{Input, LogFile};
@@ -125,8 +124,8 @@ impl Reader {
             return Reader::from_stream(path, Box::new(file));
         }
         let reader = Reader::of_file(path, file)?;
-        Ok(match reader.format {
-            Format::Rosbag2 => Reader {
+        Ok(match reader.format.reading() {
+            Reading::Database => Reader {
                 beside: Beside::of(path),
                 ..reader
             },
@@ -196,14 +195,14 @@ impl Reader {
             let have = magic.len();
             let read = from.by_ref().take(more as u64).read_to_end(&mut magic);
             read.map_err(|e| read_error(&name, 0, e))?;
-            let is_open = magic.len() > have && Format::may_be_magic(&magic);
+            let is_open = magic.len() > have && Format::may_be_log(&magic);
             more = if is_open {
                 LONGEST_MAGIC - magic.len()
             } else {
                 0
             };
         }
-        let Some(format) = Format::of_magic(&magic).filter(|f| !f.is_text()) else {
+        let Some(format) = Format::of_log(&magic) else {
             let known = recognise::marked(&magic, &[]);
             return Err(refused(&name, &magic, known));
         };
@@ -313,7 +312,7 @@ fn format_of(file: &LogFile) -> Result<Format> {
         Ok(bytes)
     };
     let head = read(0, LONGEST_MAGIC)?;
-    if let Some(format) = Format::of_magic(&head).filter(|f| !f.is_text())
+    if let Some(format) = Format::of_log(&head)
         && (!is_video(&head)
             || container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)
     {

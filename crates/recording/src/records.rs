@@ -8,6 +8,9 @@ pub(crate) mod transcript;
 
 pub(crate) use bytes::{Bytes, HEAD, head_at};
 
+/// The eight bytes at both ends of an MCAP.
+pub const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+
 /// Record opcodes.
 #[allow(missing_docs)]
 pub mod op {

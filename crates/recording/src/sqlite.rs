@@ -32,7 +32,7 @@ pub(crate) use table::{Found, Table};
 pub(crate) use tree::TWICE;
 
 /// The first bytes of a database.
-pub(crate) use crate::format::SQLITE_MAGIC as MAGIC;
+pub(crate) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
 
 use std::io;
 

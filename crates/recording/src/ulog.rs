@@ -17,10 +17,10 @@ mod format;
 mod record;
 mod transcriber;
 
-pub(crate) use transcriber::{Fault, FaultKind, Transcriber};
+pub(crate) use transcriber::Transcriber;
 
 /// The first seven bytes of a file. A byte of version and the start's time follow.
-pub(crate) use crate::format::ULOG_MAGIC as MAGIC;
+pub(crate) const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
 
 /// Bytes before the first record.
 pub(crate) const HEADER: usize = 16;

@@ -6,32 +6,13 @@
 use super::frame::{Checked, Frame, LONGEST, frame, is_log};
 use super::message;
 use crate::decode::known_definition;
+use crate::problem::{ProblemKind, Problems};
 use crate::records::imu;
-use crate::records::transcript::{Step, Transcript};
+use crate::records::transcript::{Step, Transcribe, Transcript};
 use std::collections::BTreeMap;
 
 /// Bytes looked at to believe a frame, and to find one.
 const WINDOW: usize = LONGEST + 16;
-
-/// Fault, and its place.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Fault {
-    pub(crate) offset: u64,
-    pub(crate) kind: FaultKind,
-}
-
-/// Kind of a fault in a log.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum FaultKind {
-    /// End inside a frame.
-    Cut { need: u64, have: u64 },
-    /// Bytes that are no frame.
-    Garbage { skipped: u64 },
-    /// A frame whose checksum is wrong.
-    Checksum { length: u64 },
-    /// More sensors than there are numbers for.
-    TooMany,
-}
 
 /// Sender of a sample: system, component, name of the message, sensor.
 type Sender = (u8, u8, &'static str, u8);
@@ -46,13 +27,11 @@ pub(crate) struct Transcriber {
     /// Offset at which bytes begin that are no frame.
     lost: Option<u64>,
     message: Vec<u8>,
-    pub(crate) faults: Vec<Fault>,
+    problems: Problems,
 }
 
-impl Transcriber {
-    /// Uses one frame, or what stands in its place, of `ahead`: the bytes behind those used so far, and whether the log
-    /// ends with them.
-    pub(crate) fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
+impl Transcribe for Transcriber {
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
         if ahead.len() < WINDOW && !is_end {
             return Step::Need(WINDOW);
         }
@@ -61,8 +40,8 @@ impl Transcriber {
                 self.found();
                 match found.checked {
                     Checked::Wrong => {
-                        let length = found.total as u64;
-                        self.fault(FaultKind::Checksum { length });
+                        self.fault(ProblemKind::Checksum, Some(1));
+                        self.problems.skip(found.total as u64);
                     }
                     Checked::Right => self.tell(&found, to),
                     Checked::Unknown => {}
@@ -73,7 +52,7 @@ impl Transcriber {
             Err(Some(need)) if is_end && !has_frame(ahead) => {
                 self.found();
                 let (need, have) = (need as u64, ahead.len() as u64);
-                self.fault(FaultKind::Cut { need, have });
+                self.fault(ProblemKind::Truncated { need, have }, None);
                 ahead.len()
             }
             _ => {
@@ -92,18 +71,27 @@ impl Transcriber {
         Step::Used(used)
     }
 
+    fn finish(self: Box<Self>) -> (String, Problems) {
+        (String::new(), self.problems)
+    }
+
+    fn run(&self) -> usize {
+        256 << 10
+    }
+}
+
+impl Transcriber {
     /// Tells of the bytes before that were none.
     fn found(&mut self) {
         if let Some(offset) = self.lost.take() {
             let skipped = self.at.saturating_sub(offset);
-            let kind = FaultKind::Garbage { skipped };
-            self.faults.push(Fault { offset, kind });
+            self.problems
+                .add(offset, ProblemKind::Garbage { skipped }, None);
         }
     }
 
-    fn fault(&mut self, kind: FaultKind) {
-        let offset = self.at;
-        self.faults.push(Fault { offset, kind });
+    fn fault(&mut self, kind: ProblemKind, messages: Option<u64>) {
+        self.problems.add(self.at, kind, messages);
     }
 
     fn tell(&mut self, found: &Frame<'_>, to: &mut Transcript) {
@@ -121,7 +109,7 @@ impl Transcriber {
             Some(known) => known,
             None => {
                 let Some(number) = u16::try_from(next).ok().filter(|n| *n < u16::MAX) else {
-                    return self.fault(FaultKind::TooMany);
+                    return self.fault(ProblemKind::TooManyDefinitions, None);
                 };
                 if number == 0 {
                     let text = known_definition(imu::TYPE).unwrap_or_default();

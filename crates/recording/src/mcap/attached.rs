@@ -3,8 +3,8 @@
 //! A stage of its own because these records lie outside the chunks, whose checksums do not cover them:
 //! an attachment carries its own, a metadata record has none and is judged by its lengths.
 
-use super::problem::ProblemKind;
 use super::record::{AttachmentRecord, Record, op};
+use crate::problem::ProblemKind;
 
 /// Bytes of an attachment's fields but for name, media type and data: two times, two lengths of
 /// four bytes and one of eight, and behind them the CRC.

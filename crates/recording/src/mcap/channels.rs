@@ -4,8 +4,8 @@
 //! before the message, in file order, says. A second, different definition makes a second channel,
 //! so that messages of two topics are never mixed under one id.
 
-use super::problem::{ProblemKind, Problems};
 use super::record::{ChannelRecord, SchemaRecord, op};
+use crate::problem::{ProblemKind, Problems};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

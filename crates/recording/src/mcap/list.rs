@@ -4,13 +4,13 @@
 //! metadata, indexes and the summary. One thread, no order made, chunks opened in place.
 
 use super::block::Buffers;
-use super::container::Container;
-use super::problem::{ProblemKind, Problems};
+use super::container::scan;
 use super::record::Record;
 use super::scan::{Besides, Item};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
+use crate::problem::{ProblemKind, Problems};
 use crate::records::{HEAD, head_at};
 use std::ops::ControlFlow;
 
@@ -37,7 +37,7 @@ pub fn list(
     mut visit: impl FnMut(Listed<'_>) -> ControlFlow<()>,
 ) -> Result<(Facts, Problems)> {
     let name = reader.name().to_owned();
-    let mut scanner = Container::new(reader, Besides::Everything);
+    let mut scanner = scan(reader, Besides::Everything);
     let mut buffers = Buffers::default();
     let mut problems = Problems::default();
     loop {

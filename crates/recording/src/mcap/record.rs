@@ -6,9 +6,7 @@
 
 use crate::records::Bytes;
 
-/// The eight bytes at both ends of a file.
-pub use crate::format::MCAP_MAGIC as MAGIC;
-pub use crate::records::op;
+pub use crate::records::{MAGIC, op};
 
 /// One record, borrowed from the bytes it was read from. Times are nanoseconds, offsets and
 /// lengths bytes; field names are the specification's.

@@ -8,12 +8,13 @@ mod chunk;
 
 use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
+use super::container::Container;
 use super::index::Passed;
 use super::input::{Held, Input, Tape};
-use super::problem::{ProblemKind, Problems};
 use super::record::{MAGIC, Record, op};
 use super::resync;
 use crate::format::Format;
+use crate::problem::{ProblemKind, Problems};
 use crate::records::{HEAD, head_at};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -137,11 +138,6 @@ impl Scanner {
         }
     }
 
-    /// Leaves out these chunks, which stand in this order.
-    pub(super) fn pass_over_chunks(&mut self, passed: &[Passed]) {
-        self.passed = passed.iter().copied().collect();
-    }
-
     /// A chunk that is not read, where the walk has come to one.
     fn passed_over(&mut self) -> io::Result<Option<Block>> {
         let at = self.tape.position();
@@ -172,58 +168,6 @@ impl Scanner {
         let left = next.and_then(|next| next.checked_sub(self.tape.position()));
         left.and_then(|left| usize::try_from(left).ok())
             .map_or(want, |left| want.min(left))
-    }
-
-    pub(super) fn tape(&self) -> &Tape {
-        &self.tape
-    }
-
-    pub(super) fn recycle(&mut self, payload: Payload) {
-        if let Payload::Held(held) = payload {
-            self.tape.recycle(held);
-        }
-    }
-
-    /// The next block, or `None` at the end.
-    pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
-        while !self.done {
-            if self.section == Section::Footer {
-                self.after_footer()?;
-                continue;
-            }
-            if let Some(block) = self.passed_over()? {
-                return Ok(Some(Item::Block(block)));
-            }
-            let at = self.tape.position();
-            let peek = self.before_passed(self.peek);
-            let ahead = self.tape.available(HEAD, peek)?;
-            let Some((opcode, length)) = head_at(ahead, 0) else {
-                let have = ahead.len() as u64;
-                self.end(at, have);
-                break;
-            };
-            let total = length.saturating_add(HEAD as u64);
-            let item = match opcode {
-                op::MESSAGE | op::SCHEMA | op::CHANNEL if self.section == Section::Data => {
-                    self.run()?
-                }
-                op::CHUNK => self.chunk(at, length)?,
-                // A message has no business in the summary: a changed byte made it one.
-                0 | op::MESSAGE => self.lost(at, total)?,
-                op::DATA_END | op::FOOTER if length > SLACK => self.lost(at, total)?,
-                _ if !self.may_skip(opcode, length) => self.lost(at, total)?,
-                _ => self.other(at, opcode, length)?,
-            };
-            if item.is_some() {
-                return Ok(item);
-            }
-        }
-        Ok(None)
-    }
-
-    /// Messages there should be, by the statistics; known only after a complete end.
-    pub(super) fn claimed(&self) -> Option<u64> {
-        self.claimed_in_all.filter(|_| self.done && self.complete)
     }
 
     /// Whether a record of this length can be stepped over. A stream cannot be asked how long it
@@ -502,5 +446,66 @@ impl Scanner {
             self.done = true;
         }
         Ok(None)
+    }
+}
+
+impl Container for Scanner {
+    fn next(&mut self) -> io::Result<Option<Item>> {
+        while !self.done {
+            if self.section == Section::Footer {
+                self.after_footer()?;
+                continue;
+            }
+            if let Some(block) = self.passed_over()? {
+                return Ok(Some(Item::Block(block)));
+            }
+            let at = self.tape.position();
+            let peek = self.before_passed(self.peek);
+            let ahead = self.tape.available(HEAD, peek)?;
+            let Some((opcode, length)) = head_at(ahead, 0) else {
+                let have = ahead.len() as u64;
+                self.end(at, have);
+                break;
+            };
+            let total = length.saturating_add(HEAD as u64);
+            let item = match opcode {
+                op::MESSAGE | op::SCHEMA | op::CHANNEL if self.section == Section::Data => {
+                    self.run()?
+                }
+                op::CHUNK => self.chunk(at, length)?,
+                // A message has no business in the summary: a changed byte made it one.
+                0 | op::MESSAGE => self.lost(at, total)?,
+                op::DATA_END | op::FOOTER if length > SLACK => self.lost(at, total)?,
+                _ if !self.may_skip(opcode, length) => self.lost(at, total)?,
+                _ => self.other(at, opcode, length)?,
+            };
+            if item.is_some() {
+                return Ok(item);
+            }
+        }
+        Ok(None)
+    }
+
+    fn position(&self) -> u64 {
+        self.tape.position()
+    }
+
+    fn finish(self: Box<Self>) -> (Facts, Problems) {
+        (self.facts, self.problems)
+    }
+
+    fn recycle(&mut self, payload: Payload) {
+        if let Payload::Held(held) = payload {
+            self.tape.recycle(held);
+        }
+    }
+
+    fn pass_over_chunks(&mut self, passed: &[Passed]) {
+        self.passed = passed.iter().copied().collect();
+    }
+
+    /// Messages there should be, by the statistics; known only after a complete end.
+    fn claimed(&self) -> Option<u64> {
+        self.claimed_in_all.filter(|_| self.done && self.complete)
     }
 }

@@ -5,11 +5,10 @@
 
 use super::block::Compression;
 use super::channels::{Channel, Table};
-use super::container;
+use super::container::{self, Container};
 use super::index::PassedOver;
 use super::input::Input;
 use super::messages::Tally;
-use super::problem::{ProblemKind, Problems};
 use super::record::op;
 use super::scan::{Besides, Facts, Scanner};
 use super::summary::{self, Summary};
@@ -17,6 +16,7 @@ use super::walk::{WalkOptions, walk};
 use super::{Reader, read_error};
 use crate::error::{Error, Result};
 use crate::format::Format;
+use crate::problem::{ProblemKind, Problems};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;

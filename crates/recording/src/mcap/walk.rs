@@ -8,17 +8,17 @@
 mod state;
 
 use super::channels::{Channel, Table};
-use super::container::Container;
+use super::container::scan;
 use super::input::Input;
 use super::messages::Message;
 use super::order::{Batch, Lookahead, Merger, Order};
-use super::problem::Problems;
 use super::record::Record;
 use super::scan::Besides;
 use super::survey::{Survey, fallback};
 use super::workers::{Shared, Ticket};
 use super::{Reader, read_error};
 use crate::error::Result;
+use crate::problem::Problems;
 use state::Course;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -203,7 +203,7 @@ where
         consume: &mut consume,
         attached: &mut attached,
         scanner: {
-            let mut scanner = Container::new(reader, besides);
+            let mut scanner = scan(reader, besides);
             if let Some(passed) = &passed {
                 scanner.pass_over_chunks(&passed.chunks);
             }

@@ -55,13 +55,13 @@ impl MadeBefore {
         if let Some(text) = in_text(&head) {
             return Some(text);
         }
-        if Format::of_magic(&head) == Some(Format::Parquet) {
+        if Format::of_bytes(&head) == Some(Format::Parquet) {
             let rows = Rows::open(File::open(path).ok()?, None).ok()?;
             let mut text = Vec::new();
             rows.take(HEAD).read_to_end(&mut text).ok()?;
             return in_text(&text);
         }
-        let is_ours = Format::of_magic(&head) == Some(Format::Mcap)
+        let is_ours = Format::of_bytes(&head) == Some(Format::Mcap)
             && head.windows(OURS.len()).any(|part| part == OURS.as_bytes());
         let reader = Reader::open(path).ok().filter(|_| is_ours)?;
         in_survey(&mcap::survey(&reader, &WalkOptions::default()).ok()?)

@@ -4,6 +4,8 @@
 //! channels and messages here, and what follows (definitions, workers, order, counting) cannot tell.
 
 use super::op;
+use crate::problem::Problems;
+use std::fmt::Debug;
 
 /// Records one after another, as they would lie in a chunk.
 #[derive(Debug, Default)]
@@ -18,6 +20,38 @@ pub(crate) enum Step {
     Used(usize),
     /// Number of bytes that are needed; none were used.
     Need(usize),
+}
+
+/// Transcriber of a log that is read from its front to its end. Bytes come in any cut; what comes out depends on the
+/// bytes alone.
+pub(crate) trait Transcribe: Debug {
+    /// Uses one record, or what stands in its place, of `ahead`: the bytes behind those used so far, and whether the log
+    /// ends with them.
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step;
+
+    /// Software or system that wrote the log, and what was wrong with it.
+    fn finish(self: Box<Self>) -> (String, Problems);
+
+    /// Bytes read, and bytes of records worked on, together.
+    fn run(&self) -> usize {
+        1 << 20
+    }
+
+    /// Steps until there are [`Transcribe::run`] bytes of records: how many bytes were used, and how many are needed to
+    /// go on.
+    fn steps(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> (usize, usize) {
+        let (mut rest, mut need) = (ahead, 1);
+        while !rest.is_empty() && to.bytes.len() < self.run() {
+            match self.step(rest, is_end, to) {
+                Step::Used(n) => rest = rest.get(n..).unwrap_or(&[]),
+                Step::Need(n) => {
+                    need = n.max(rest.len() + 1);
+                    break;
+                }
+            }
+        }
+        (ahead.len() - rest.len(), need)
+    }
 }
 
 impl Transcript {

@@ -7,7 +7,9 @@
 use super::format::{Format, Formats, Layout};
 use super::record::{HEAD, LONGEST, Look, head, id, look, pair};
 use super::{HEADER, MAGIC};
-use crate::records::transcript::{Step, Transcript};
+use crate::problem::{ProblemKind, Problems};
+use crate::records::op;
+use crate::records::transcript::{Step, Transcribe, Transcript};
 use std::collections::BTreeMap;
 
 /// Most formats.
@@ -24,32 +26,6 @@ const BETWEEN: usize = 8;
 const WINDOW: usize = (CHAIN + BETWEEN) * LONGEST;
 /// Most bytes of a name in what a log says about itself.
 const MAX_SAID: usize = 100;
-
-/// Fault, and its place.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Fault {
-    pub(crate) offset: u64,
-    pub(crate) kind: FaultKind,
-}
-
-/// Kind of a fault in a log.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) enum FaultKind {
-    /// End inside a record.
-    Cut { need: u64, have: u64 },
-    /// Bytes that are no record.
-    Garbage { skipped: u64 },
-    /// A record without the marks of its type.
-    Wrong { kind: u8, length: u64 },
-    /// A definition that cannot be used.
-    Definition { kind: u8 },
-    /// Definitions beyond the limits.
-    TooMany,
-    /// The logger was too slow, and dropped what came within this time.
-    Dropout { millis: u16 },
-    /// A feature this program does not know, without which the rest may be misread.
-    Feature { bits: u64 },
-}
 
 /// A log under way.
 #[derive(Debug, Default)]
@@ -71,7 +47,7 @@ pub(crate) struct Transcriber {
     time: u64,
     /// Facts that the log states about its system: `sys_name`, `ver_hw`, `ver_sw`.
     said: BTreeMap<&'static str, String>,
-    pub(crate) faults: Vec<Fault>,
+    problems: Problems,
 }
 
 /// The messages of an id.
@@ -81,10 +57,8 @@ struct Kind {
     count: u32,
 }
 
-impl Transcriber {
-    /// Uses one record, or what stands in its place, of `ahead`: the bytes behind those used so far, and
-    /// whether the log ends with them.
-    pub(crate) fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
+impl Transcribe for Transcriber {
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
         let used = match self.next(ahead, is_end, to) {
             Ok(used) => used,
             Err(need) => return Step::Need(need),
@@ -93,6 +67,12 @@ impl Transcriber {
         Step::Used(used)
     }
 
+    fn finish(self: Box<Self>) -> (String, Problems) {
+        (self.system(), self.problems)
+    }
+}
+
+impl Transcriber {
     fn next(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Result<usize, usize> {
         if self.at == 0 {
             return self.begin(ahead, is_end);
@@ -147,7 +127,8 @@ impl Transcriber {
             // The format may grow; but a flipped bit makes the same of a message.
             Look::Strange | Look::Wrong => {
                 let length = length as u64;
-                self.fault(FaultKind::Wrong { kind, length });
+                self.fault(ProblemKind::WrongRecord { kind, length });
+                self.problems.skip(length);
             }
         }
         Ok(total)
@@ -225,22 +206,19 @@ impl Transcriber {
         self.lost = None;
         let used = found.map_or(ahead.len(), |at| own + at);
         let skipped = (self.at - from) + used as u64;
-        self.faults.push(Fault {
-            offset: from,
-            kind: FaultKind::Garbage { skipped },
-        });
+        self.problems
+            .add(from, ProblemKind::Garbage { skipped }, None);
         Ok(used)
     }
 
-    fn fault(&mut self, kind: FaultKind) {
-        let offset = self.at;
-        self.faults.push(Fault { offset, kind });
+    fn fault(&mut self, kind: ProblemKind) {
+        self.problems.add(self.at, kind, None);
     }
 
     fn fault_cut(&mut self, need: usize, have: usize) {
         if have > 0 {
             let (need, have) = (need as u64, have as u64);
-            self.fault(FaultKind::Cut { need, have });
+            self.fault(ProblemKind::Truncated { need, have });
         }
     }
 
@@ -252,7 +230,7 @@ impl Transcriber {
             b'A' => self.subscription(body, to),
             b'O' => {
                 let millis = id(body).unwrap_or(0);
-                self.fault(FaultKind::Dropout { millis });
+                self.fault(ProblemKind::Dropout { millis });
             }
             b'B' => self.flags(body),
             b'I' => self.information(body),
@@ -279,13 +257,13 @@ impl Transcriber {
     fn format(&mut self, body: &[u8]) {
         let text = std::str::from_utf8(body).ok().and_then(Format::parse);
         let Some(format) = text else {
-            return self.fault(FaultKind::Definition { kind: b'F' });
+            return self.fault(ProblemKind::BadDefinition { opcode: op::SCHEMA });
         };
         if self.formats.get(&format.name) == Some(&format) {
             return;
         }
         if self.formats.len() >= MAX_FORMATS {
-            return self.fault(FaultKind::TooMany);
+            return self.fault(ProblemKind::TooManyDefinitions);
         }
         self.schemas.remove(&format.name);
         self.formats.insert(format.name.clone(), format);
@@ -303,9 +281,11 @@ impl Transcriber {
         let layout = format.and_then(|format| format.layout(&self.formats, &mut self.steps));
         let (Some(format), Some(layout)) = (format, layout) else {
             let kind = if self.steps == 0 {
-                FaultKind::TooMany
+                ProblemKind::TooManyDefinitions
             } else {
-                FaultKind::Definition { kind: b'A' }
+                ProblemKind::BadDefinition {
+                    opcode: op::CHANNEL,
+                }
             };
             self.kinds.remove(&id);
             return self.fault(kind);
@@ -332,7 +312,7 @@ impl Transcriber {
         };
         let Some(schema) = schema else {
             self.kinds.remove(&id);
-            return self.fault(FaultKind::TooMany);
+            return self.fault(ProblemKind::TooManyDefinitions);
         };
         // The first of several sensors of a kind has the plain name.
         let topic = match instance {
@@ -348,7 +328,7 @@ impl Transcriber {
         let word = |n: usize| word(n).map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let needed = word(1);
         if needed & !1 != 0 {
-            self.fault(FaultKind::Feature { bits: needed & !1 });
+            self.fault(ProblemKind::UnknownFeature { bits: needed & !1 });
         }
         if needed & 1 != 0 && self.appended.is_empty() {
             self.appended = (2..5).map(word).filter(|start| *start > 0).collect();
@@ -370,7 +350,7 @@ impl Transcriber {
     }
 
     /// `PX4 on AUAV_X21, fd483321a5cf`.
-    pub(crate) fn system(&self) -> String {
+    fn system(&self) -> String {
         let said = |name: &str| self.said.get(name).map_or("", String::as_str);
         let (system, hardware) = (said("sys_name"), said("ver_hw"));
         let version: String = said("ver_sw").chars().take(12).collect();

@@ -54,7 +54,7 @@ fn scaled(n: u32) -> Vec<u8> {
 }
 
 /// Messages and faults, pushed in pieces.
-fn read(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<FaultKind>) {
+fn read(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<ProblemKind>) {
     let mut transcriber = Transcriber::default();
     let mut to = Transcript::default();
     let (mut from, mut have) = (0, 0);
@@ -77,7 +77,8 @@ fn read(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<FaultKind>) {
         }
         at = end;
     }
-    let faults = transcriber.faults.iter().map(|fault| fault.kind).collect();
+    let faults = transcriber.problems.first().iter();
+    let faults = faults.map(|fault| fault.kind.clone()).collect();
     (messages, faults)
 }
 
@@ -144,7 +145,7 @@ fn garbage_between_frames_and_a_cut_are_told() {
     .concat();
     let (messages, faults) = read(&log, 50);
     assert_eq!(messages.len(), 3);
-    let garbage = |skipped| FaultKind::Garbage { skipped };
+    let garbage = |skipped| ProblemKind::Garbage { skipped };
     assert_eq!(faults, [garbage(777), garbage(3)]);
     // Up to where its magic stands, what is left of the last tells nothing.
     for cut in 1..highres(3, 2).len() {

@@ -3,9 +3,9 @@
 //! Apart because it is told as it is unpacked: what is held is one record and what is told, and it ends where records
 //! do.
 
-use super::super::problem::ProblemKind;
 use super::{Compression, PIECE, TOO_MANY, most_messages};
 use crate::bag;
+use crate::problem::ProblemKind;
 use crate::records::transcript::Transcript;
 use std::io::{self, BufRead, Read};
 

@@ -7,11 +7,12 @@ use super::super::Limits;
 use super::super::block::{Block, Compression, Kind, Payload};
 use super::super::channels::Fallback;
 use super::super::input::{Input, LogFile, Tape};
-use super::super::problem::{ProblemKind, Problems};
 use super::super::record::op as record_op;
 use super::super::scan::{Facts, Item};
+use super::Container;
 use crate::bag::{self, Head, op};
 use crate::format::Format;
+use crate::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
 use crate::records::{HEAD, head_at};
 use std::io;
@@ -83,59 +84,6 @@ impl Scanner {
             index: None,
             told: (0, 0),
         }
-    }
-
-    pub(super) fn tape(&self) -> &Tape {
-        &self.tape
-    }
-
-    pub(super) fn recycle(&mut self, payload: Payload) {
-        if let Payload::Held(held) = payload {
-            self.tape.recycle(held);
-        }
-    }
-
-    pub(super) fn finish(self) -> (Facts, Problems) {
-        (self.facts, self.problems)
-    }
-
-    /// Messages by the index, where it tells of every chunk.
-    pub(super) fn claimed(&self) -> Option<u64> {
-        let (chunks, messages) = self.told;
-        let is_whole = self.index.is_some_and(|(at, n)| at > 0 && n == chunks);
-        is_whole.then_some(messages)
-    }
-
-    pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
-        if self.tape.position() == 0 {
-            self.tape.skip(bag::MAGIC.len() as u64)?;
-        }
-        while !self.done {
-            let at = self.tape.position();
-            let Some(kept) = self.head()? else { continue };
-            let item = match kept.op {
-                op::CHUNK => self.chunk(at, &kept)?,
-                // Outside of chunks: in the index, or where the recorder was killed inside one.
-                op::MESSAGE | op::CONNECTION => self.chunk(at, &kept)?,
-                op::BAG | op::INDEX => {
-                    self.index = kept.index.or(self.index);
-                    self.pass_over(at, kept.total)?;
-                    None
-                }
-                op::CHUNK_INFO => {
-                    self.chunk_info(at, &kept)?;
-                    None
-                }
-                _ => {
-                    self.lost(at, kept.total)?;
-                    None
-                }
-            };
-            if item.is_some() {
-                return Ok(item);
-            }
-        }
-        Ok(None)
     }
 
     /// The head of the record here; `None` at the end, and where none was and the next chunk was looked for.
@@ -382,6 +330,61 @@ impl Scanner {
         };
         self.problems.add(at, kind, None);
         Ok(())
+    }
+}
+
+impl Container for Scanner {
+    fn next(&mut self) -> io::Result<Option<Item>> {
+        if self.tape.position() == 0 {
+            self.tape.skip(bag::MAGIC.len() as u64)?;
+        }
+        while !self.done {
+            let at = self.tape.position();
+            let Some(kept) = self.head()? else { continue };
+            let item = match kept.op {
+                op::CHUNK => self.chunk(at, &kept)?,
+                // Outside of chunks: in the index, or where the recorder was killed inside one.
+                op::MESSAGE | op::CONNECTION => self.chunk(at, &kept)?,
+                op::BAG | op::INDEX => {
+                    self.index = kept.index.or(self.index);
+                    self.pass_over(at, kept.total)?;
+                    None
+                }
+                op::CHUNK_INFO => {
+                    self.chunk_info(at, &kept)?;
+                    None
+                }
+                _ => {
+                    self.lost(at, kept.total)?;
+                    None
+                }
+            };
+            if item.is_some() {
+                return Ok(item);
+            }
+        }
+        Ok(None)
+    }
+
+    fn position(&self) -> u64 {
+        self.tape.position()
+    }
+
+    fn finish(self: Box<Self>) -> (Facts, Problems) {
+        (self.facts, self.problems)
+    }
+
+    fn recycle(&mut self, payload: Payload) {
+        if let Payload::Held(held) = payload {
+            self.tape.recycle(held);
+        }
+    }
+
+    /// Messages by the index, where it tells of every chunk.
+    fn claimed(&self) -> Option<u64> {
+        let (chunks, messages) = self.told;
+        let is_whole = self.index.is_some_and(|(at, n)| at > 0 && n == chunks);
+        is_whole.then_some(messages)
     }
 }
 

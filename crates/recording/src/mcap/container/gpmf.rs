@@ -5,13 +5,14 @@
 
 use super::super::block::Block;
 use super::super::input::{Input, LogFile};
-use super::super::problem::{ProblemKind, Problems};
 use super::super::scan::{Facts, Item};
+use super::Container;
 use crate::format::Format;
 use crate::gpmf::{
     self, ITEM_HEAD, LONGEST, Lasts, MAGIC, Movie, SECOND, Sample, Transcriber, item_length,
     next_device,
 };
+use crate::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
 use std::io;
 use std::sync::Arc;
@@ -69,33 +70,6 @@ impl Scanner {
             position: 0,
             read: 0,
         }
-    }
-
-    pub(super) fn position(&self) -> u64 {
-        self.position
-    }
-
-    pub(super) fn finish(self) -> (Facts, Problems) {
-        let facts = Facts {
-            format: Format::Gpmf,
-            library: match self.transcriber.camera.as_str() {
-                "" => String::new(),
-                name => format!("GoPro {name}"),
-            },
-            ..Facts::default()
-        };
-        (facts, self.problems)
-    }
-
-    pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
-        let mut to = Transcript::default();
-        let offset = self.position;
-        if let Some(file) = self.file.clone() {
-            while to.bytes.len() < RUN && !matches!(self.source, Source::Done) {
-                self.step(&file, &mut to)?;
-            }
-        }
-        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 
     /// The next payload, or what stands in its place.
@@ -279,6 +253,35 @@ impl Scanner {
             None => self.end(to),
         }
         Ok(())
+    }
+}
+
+impl Container for Scanner {
+    fn position(&self) -> u64 {
+        self.position
+    }
+
+    fn finish(self: Box<Self>) -> (Facts, Problems) {
+        let facts = Facts {
+            format: Format::Gpmf,
+            library: match self.transcriber.camera.as_str() {
+                "" => String::new(),
+                name => format!("GoPro {name}"),
+            },
+            ..Facts::default()
+        };
+        (facts, self.problems)
+    }
+
+    fn next(&mut self) -> io::Result<Option<Item>> {
+        let mut to = Transcript::default();
+        let offset = self.position;
+        if let Some(file) = self.file.clone() {
+            while to.bytes.len() < RUN && !matches!(self.source, Source::Done) {
+                self.step(&file, &mut to)?;
+            }
+        }
+        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 }
 

@@ -5,11 +5,12 @@
 
 use super::super::block::{Block, Payload};
 use super::super::input::{Input, LogFile};
-use super::super::problem::{ProblemKind, Problems};
 use super::super::scan::{Facts, Item};
 use super::super::{Beside, Limits};
 use super::pages::FilePages;
+use super::{Container, Spare};
 use crate::format::Format;
+use crate::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
 use crate::rosbag2::{Bag, Fault, FaultKind};
 use std::io;
@@ -17,8 +18,6 @@ use std::sync::Arc;
 
 /// Bytes of records worked on together.
 const RUN: usize = 1 << 20;
-/// Blocks whose memory is kept: as many as are on their way with few threads.
-const SPARE: usize = 8;
 
 /// The walk over a recording.
 #[derive(Debug)]
@@ -31,7 +30,7 @@ pub(in super::super) struct Scanner {
     distribution: String,
     /// Position in the file of the records given last.
     position: u64,
-    spare: Vec<Vec<u8>>,
+    spare: Spare,
 }
 
 impl Scanner {
@@ -48,44 +47,8 @@ impl Scanner {
             problems: Problems::default(),
             distribution: String::new(),
             position: 0,
-            spare: Vec::new(),
+            spare: Spare::default(),
         }
-    }
-
-    pub(super) fn position(&self) -> u64 {
-        self.position
-    }
-
-    pub(super) fn recycle(&mut self, payload: Payload) {
-        if let Payload::Held(mut held) = payload
-            && self.spare.len() < SPARE
-        {
-            held.bytes.clear();
-            self.spare.push(held.bytes);
-        }
-    }
-
-    pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
-        let mut to = Transcript {
-            bytes: self.spare.pop().unwrap_or_default(),
-        };
-        if let Some((file, beside)) = self.files.take() {
-            self.begin(file, beside, &mut to)?;
-        }
-        let offset = self.position;
-        while let Some((pages, bag)) = &mut self.open
-            && to.bytes.len() < RUN
-        {
-            let goes_on = bag.next(pages, &mut to)?;
-            for fault in bag.faults.drain(..) {
-                told(fault, pages, &mut self.problems);
-            }
-            self.position = pages.offset(bag.page());
-            if !goes_on {
-                self.open = None;
-            }
-        }
-        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 
     fn begin(&mut self, file: Arc<LogFile>, beside: Beside, to: &mut Transcript) -> io::Result<()> {
@@ -112,8 +75,41 @@ impl Scanner {
         }
         Ok(())
     }
+}
 
-    pub(super) fn finish(self) -> (Facts, Problems) {
+impl Container for Scanner {
+    fn next(&mut self) -> io::Result<Option<Item>> {
+        let mut to = Transcript {
+            bytes: self.spare.take(),
+        };
+        if let Some((file, beside)) = self.files.take() {
+            self.begin(file, beside, &mut to)?;
+        }
+        let offset = self.position;
+        while let Some((pages, bag)) = &mut self.open
+            && to.bytes.len() < RUN
+        {
+            let goes_on = bag.next(pages, &mut to)?;
+            for fault in bag.faults.drain(..) {
+                told(fault, pages, &mut self.problems);
+            }
+            self.position = pages.offset(bag.page());
+            if !goes_on {
+                self.open = None;
+            }
+        }
+        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
+    }
+
+    fn position(&self) -> u64 {
+        self.position
+    }
+
+    fn recycle(&mut self, payload: Payload) {
+        self.spare.put(payload);
+    }
+
+    fn finish(self: Box<Self>) -> (Facts, Problems) {
         let library = match self.distribution.as_str() {
             "" => "rosbag2".to_owned(),
             name => format!("rosbag2 of ROS 2 {name}"),

@@ -10,7 +10,6 @@ use super::super::container::Container;
 use super::super::index::PassedOver;
 use super::super::messages::{Message, Stop, Tally, pass};
 use super::super::order::{Batch, Merger};
-use super::super::problem::{ProblemKind, Problems};
 use super::super::read_error;
 use super::super::record::Record;
 use super::super::scan::Item;
@@ -18,6 +17,7 @@ use super::super::survey::Survey;
 use super::super::workers::{Done, Findings, Outcome, Piece, Shared, Ticket, place};
 use super::WalkReport;
 use crate::error::{Error, Result};
+use crate::problem::{ProblemKind, Problems};
 use crate::records::{HEAD, head_at};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -38,7 +38,7 @@ pub(super) struct Course<'w, T, D, M> {
     pub(super) select: &'w mut dyn FnMut(&Arc<Channel>) -> Option<D>,
     pub(super) consume: &'w mut dyn FnMut(&mut Vec<T>) -> ControlFlow<()>,
     pub(super) attached: &'w mut dyn FnMut(Record<'_>),
-    pub(super) scanner: Container,
+    pub(super) scanner: Box<dyn Container>,
     pub(super) merger: Merger<T>,
     pub(super) tallies: Vec<Tally>,
     /// Messages without a channel, by id, and where the first was.

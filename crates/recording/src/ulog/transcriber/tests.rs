@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::problem::Problem;
 
 fn record(kind: u8, body: &[u8]) -> Vec<u8> {
     let mut out = (body.len() as u16).to_le_bytes().to_vec();
@@ -40,16 +41,15 @@ fn message(id: u16, n: u64) -> Vec<u8> {
 }
 
 /// Pushes `log` in pieces of `cut` bytes; the records and faults that come out.
-fn read(log: &[u8], cut: usize) -> (Vec<u8>, Vec<Fault>, Transcriber) {
+fn read(log: &[u8], cut: usize) -> (Vec<u8>, Problems, Transcriber) {
     let mut transcriber = Transcriber::default();
     let mut to = Transcript::default();
-    let mut faults = Vec::new();
     let (mut from, mut until) = (0, cut.min(log.len()));
     loop {
         let ahead = &log[from..until];
         let is_end = until == log.len();
         if ahead.is_empty() && is_end {
-            return (to.bytes, faults, transcriber);
+            return (to.bytes, transcriber.problems.clone(), transcriber);
         }
         match transcriber.step(ahead, is_end, &mut to) {
             Step::Used(n) => {
@@ -61,7 +61,6 @@ fn read(log: &[u8], cut: usize) -> (Vec<u8>, Vec<Fault>, Transcriber) {
                 until = (until + cut).min(log.len());
             }
         }
-        faults.append(&mut transcriber.faults);
     }
 }
 
@@ -95,7 +94,7 @@ fn log(n: u64) -> Vec<u8> {
 #[test]
 fn definitions_become_channels_and_messages_keep_their_time() {
     let (records, faults, transcriber) = read(&log(6), usize::MAX);
-    assert_eq!(faults, []);
+    assert!(faults.is_empty(), "{faults:?}");
     assert_eq!(transcriber.system(), "PX4");
     let found = messages(&records);
     assert_eq!(found.len(), 8);
@@ -123,7 +122,7 @@ fn pushed_in_any_cut_a_damaged_log_gives_the_same_records_and_faults() {
     }
     bytes.drain(300_000..300_007);
     let whole = read(&bytes, usize::MAX);
-    assert!(whole.1.len() >= 3, "{:?}", whole.1);
+    assert!(whole.1.total() >= 3, "{:?}", whole.1);
     for cut in [977, 70_001, 1 << 20] {
         let cut_up = read(&bytes, cut);
         assert!(cut_up.0 == whole.0, "records differ at {cut}");
@@ -150,8 +149,9 @@ fn a_log_cut_anywhere_gives_its_whole_messages_and_says_that_it_was_cut() {
         assert_eq!(messages(&records).len(), expected, "{cut}");
         let is_between = ends.contains(&cut) || cut == definitions().len();
         let is_said = faults
+            .first()
             .iter()
-            .any(|f| matches!(f.kind, FaultKind::Cut { .. }));
+            .any(|f| matches!(f.kind, ProblemKind::Truncated { .. }));
         assert_eq!(is_said, !is_between, "{cut}: {faults:?}");
     }
 }
@@ -192,12 +192,13 @@ fn a_record_of_an_unknown_type_is_stepped_over_and_dropouts_are_told() {
     let (records, faults, _) = read(&bytes, usize::MAX);
     let ids: Vec<u16> = messages(&records).iter().map(|(id, _)| *id).collect();
     assert_eq!(ids, [7, 7, 7, 99, 7]);
-    let kinds: Vec<FaultKind> = faults.into_iter().map(|f| f.kind).collect();
-    let strange = FaultKind::Wrong {
+    let kinds = faults.first().iter().map(|f| f.kind.clone());
+    let kinds: Vec<ProblemKind> = kinds.collect();
+    let strange = ProblemKind::WrongRecord {
         kind: b'Z',
         length: 300,
     };
-    assert_eq!(kinds, [strange, FaultKind::Dropout { millis: 62 }]);
+    assert_eq!(kinds, [strange, ProblemKind::Dropout { millis: 62 }]);
 }
 
 #[test]
@@ -217,8 +218,8 @@ fn what_was_appended_later_is_read_behind_a_record_it_cuts() {
     for cut in [1, 50, usize::MAX] {
         let (records, faults, _) = read(&bytes, cut);
         assert_eq!(messages(&records).len(), 3, "{cut}");
-        assert_eq!(faults.len(), 1, "{faults:?}");
-        assert_eq!(faults[0].offset, start - 9);
+        assert_eq!(faults.total(), 1, "{faults:?}");
+        assert_eq!(faults.first()[0].offset, start - 9);
     }
 }
 
@@ -238,6 +239,7 @@ fn definitions_that_spell_out_to_millions_of_fields_are_refused_within_a_bound()
     }
     let (records, faults, transcriber) = read(&bytes, usize::MAX);
     assert_eq!((transcriber.steps, records.len()), (0, 0));
-    assert!(faults.iter().all(|f| f.kind == FaultKind::TooMany));
-    assert_eq!(faults.len(), 1000);
+    let is_one = |f: &Problem| f.kind == ProblemKind::TooManyDefinitions;
+    assert!(faults.first().iter().all(is_one));
+    assert_eq!(faults.total(), 1000);
 }

@@ -3,6 +3,7 @@
 //! A stage of its own because a damaged log must still be read to its end: nothing here is an
 //! error, everything here is counted.
 
+use crate::records::op;
 use std::fmt;
 
 /// Number of problems kept in full; the rest are only counted, so that a hostile file
@@ -320,7 +321,7 @@ impl fmt::Display for ProblemKind {
                 write!(f, "messages on channel {id}, which is not defined")
             }
             ProblemKind::BadDefinition { opcode } => {
-                let what = if *opcode == super::record::op::SCHEMA {
+                let what = if *opcode == op::SCHEMA {
                     "schema"
                 } else {
                     "channel"
@@ -421,7 +422,7 @@ pub struct Problems {
 }
 
 impl Problems {
-    pub(super) fn add(&mut self, offset: u64, kind: ProblemKind, messages: Option<u64>) {
+    pub(crate) fn add(&mut self, offset: u64, kind: ProblemKind, messages: Option<u64>) {
         self.total += 1;
         self.losses += u64::from(kind.is_loss());
         self.messages = self.messages.saturating_add(messages.unwrap_or(0));
@@ -440,11 +441,11 @@ impl Problems {
     }
 
     /// Bytes the last problem made unusable, where its own fields do not say.
-    pub(super) fn skip(&mut self, bytes: u64) {
+    pub(crate) fn skip(&mut self, bytes: u64) {
         self.skipped = self.skipped.saturating_add(bytes);
     }
 
-    pub(super) fn merge(&mut self, other: Problems) {
+    pub(crate) fn merge(&mut self, other: Problems) {
         self.total += other.total;
         self.losses += other.losses;
         self.messages = self.messages.saturating_add(other.messages);
