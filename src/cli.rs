@@ -43,6 +43,16 @@ fn recordings(subject: &str, besides: &str) -> String {
     format!("{subject}: {formats}{besides}; - is standard input")
 }
 
+/// Help of an argument that takes outputs: the subject with the formats that are written, what else it takes, and the
+/// rest of what is said of it.
+fn sinks(subject: &str, besides: &str, rest: &str) -> String {
+    format!(
+        "{subject}{besides}, - (NDJSON on stdout), null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, \
+         ws-listen://HOST:PORT (whoever connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who \
+         listens). {rest}May be given several times"
+    )
+}
+
 /// Gyro samples in, attitude you can trust out.
 #[derive(Parser, Debug)]
 #[command(

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::replay;
 use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
-use crate::sink::{Compression, Encoding, Options, Precision, Target};
+use crate::sink::{Compression, Encoding, Format, Options, Precision, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -38,11 +38,7 @@ use strapd_recording::pool::Pool;
 pub struct Replay {
     #[arg(required = true, value_name = "SOURCE", help = super::recordings("Recordings", ", or folders of one"))]
     pub sources: Vec<String>,
-    /// Output for the attitude: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
-    /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
-    /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
-    /// {stem} stands for the log's name, and its folder is made, as that of DIR/ is. May be given several times
-    #[arg(short, long = "output", value_name = "SINK")]
+    #[arg(short, long = "output", value_name = "SINK", help = sinks())]
     pub outputs: Vec<String>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -106,6 +102,15 @@ pub struct Replay {
     /// Take only logs i, i+n, i+2n, ... of the list (i from 0)
     #[arg(long, value_name = "I/N", help_heading = "Output")]
     pub shard: Option<String>,
+}
+
+/// Help of `-o`.
+fn sinks() -> String {
+    super::sinks(
+        &format!("Output for the attitude: a {} file", Format::endings()),
+        ", a directory",
+        "{stem} stands for the log's name, and its folder is made, as that of DIR/ is. ",
+    )
 }
 
 /// `--encoding`.

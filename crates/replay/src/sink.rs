@@ -14,6 +14,7 @@ mod csv;
 mod decimate;
 mod document;
 mod form;
+mod format;
 pub mod json;
 mod mcap;
 mod output;
@@ -34,6 +35,9 @@ pub use copy::CopiedChannel;
 pub use csv::{RAW_HEADER, push_raw_row, roll_pitch_yaw};
 pub use decimate::Decimator;
 pub use document::Document;
+pub use form::Precision;
+pub use format::Format;
+pub use json::Profile;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
 pub use mcap::payload;
@@ -44,14 +48,12 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 pub use stream::{ChildFrames, Content, Provenance, Stream, output_topic};
 
-pub use target::{Format, Precision, Profile, Target};
+pub use target::Target;
 
 use crate::error::{Error, Result};
 use batch::Batch;
-use form::{Form, Slot};
-use mcap::Layout;
+use form::{Form, Opening, Slot};
 use mcap::chunk::Chunk;
-use mcap::file::McapFile;
 use output::{Output, STDOUT_NAME};
 use rayon::ThreadPool;
 use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
@@ -101,8 +103,8 @@ pub struct Written {
 #[derive(Debug)]
 pub struct Sink {
     state: State,
-    form: Form,
-    file: McapFile,
+    /// Form of its bytes; `None`: samples are counted and discarded.
+    form: Option<Box<dyn Form>>,
     lanes: Vec<Lane>,
     /// Copied messages waiting for their chunk to fill.
     copies: Chunk,
@@ -150,87 +152,51 @@ impl Sink {
         streams: &[Stream],
         provenance: &Provenance,
     ) -> Result<Sink> {
-        let mut tables = streams.iter().filter(|s| s.content != Content::Truth);
-        let table = tables.next();
-        let is_several = tables.next().is_some();
-        match target.format() {
-            Some(Format::Csv | Format::Tum) if is_several => {
-                return Err(Error::usage(
-                    Diagnostic::new(format!(
-                        "a table of one attitude has no column for the topic, and {} topics are estimated",
-                        streams.len()
-                    ))
-                    .help(format!(
-                        "choose one with {TOPIC}, or write .ndjson or .mcap"
-                    ))
-                ));
-            }
-            _ => {}
+        let format = target.format();
+        let is_several = streams
+            .iter()
+            .filter(|s| s.content != Content::Truth)
+            .nth(1);
+        if format.is_some_and(|format| !format.takes_several()) && is_several.is_some() {
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "a table of one attitude has no column for the topic, and {} topics are estimated",
+                    streams.len()
+                ))
+                .help(format!(
+                    "choose one with {TOPIC}, or write .ndjson or .mcap"
+                )),
+            ));
         }
         let output = Output::open(target, inputs, options.force)?;
         let streams: Vec<Stream> = streams.iter().map(Stream::bounded).collect();
-        let mut file = McapFile::default();
-        let mut head = Vec::new();
-        let form = match target.format() {
-            None => Form::Null,
-            Some(Format::Ndjson) => {
-                let profile = match target {
-                    Target::Udp { profile, .. } => *profile,
-                    _ => Profile::Lines,
-                };
-                let objects = streams.iter().map(|s| json::Objects::new(s, profile));
-                Form::Ndjson(objects.collect())
-            }
-            Some(Format::Csv) => {
-                let (header, last) = match table.map(|s| (s.content, s.world_axes.clone())) {
-                    Some((Content::Samples(kind), _)) => {
-                        (csv::SYNTHETIC_HEADER, kind.name().to_owned())
-                    }
-                    Some((_, world)) => (csv::HEADER, world),
-                    None => (csv::HEADER, String::new()),
-                };
-                head.extend_from_slice(header);
-                Form::Csv(last)
-            }
-            Some(Format::Tum) => {
-                head.extend_from_slice(tum::HEADER);
-                Form::Tum
-            }
-            Some(Format::Mcap) => Form::Mcap {
-                layout: Layout::begin(
-                    &mut file,
-                    &mut head,
-                    options.encoding,
-                    &streams,
-                    provenance,
-                )?,
-                compression: options.compression,
+        let opening = Opening {
+            options,
+            profile: match target {
+                Target::Udp { profile, .. } => *profile,
+                _ => Profile::Lines,
             },
-            #[cfg(feature = "parquet")]
-            Some(Format::Parquet) => Form::Parquet(Box::new(parquet::Table::new(
-                &streams,
-                provenance,
-                options.precision,
-            ))),
+            streams: &streams,
+            provenance,
         };
-        // A CSV has no rows for truth, a trajectory none for what is no attitude.
-        let is_left_out = |stream: &Stream| match &form {
-            Form::Csv(_) => stream.content == Content::Truth,
-            #[cfg(feature = "parquet")]
-            Form::Parquet(table) => table.leaves_out(stream),
-            Form::Tum => matches!(stream.content, Content::Samples(_)),
-            _ => false,
+        let mut head = Vec::new();
+        let form = format.and_then(|format| format.open(&opening, &mut head));
+        let form = form.transpose()?;
+        let is_left_out = |stream: &Stream| {
+            let is_sample = matches!(stream.content, Content::Samples(_));
+            let mut form = form.iter();
+            is_sample && format.is_some_and(|format| !format.takes_samples())
+                || form.any(|form| form.leaves_out(stream))
         };
         let left_out: Vec<bool> = streams.iter().map(is_left_out).collect();
-        Sink::begin(output, form, file, &head, &left_out)
+        Sink::begin(output, form, &head, &left_out)
     }
 
     /// The sink once its head is made; writes it. `left_out`: by stream, whether nothing of it is
     /// written.
     fn begin(
         output: Output,
-        form: Form,
-        file: McapFile,
+        form: Option<Box<dyn Form>>,
         head: &[u8],
         left_out: &[bool],
     ) -> Result<Sink> {
@@ -251,7 +217,6 @@ impl Sink {
             is_socket: output.is_socket(),
             state: State::Open(output),
             form,
-            file,
             lanes,
             copies: Chunk::default(),
             slots: Vec::new(),
@@ -303,7 +268,7 @@ impl Sink {
         collected: fn(&mut Batch) -> &mut Vec<T>,
         pool: &ThreadPool,
     ) -> Result<Flow> {
-        if matches!(self.form, Form::Null) {
+        if self.form.is_none() {
             self.samples += samples.len() as u64;
             return Ok(Flow::Continue);
         }
@@ -357,14 +322,12 @@ impl Sink {
     /// [`Error::Write`]; [`Error::OutputExists`] when somebody else created the file meanwhile.
     pub fn finish(mut self) -> Result<Written> {
         if self.is_open()? && self.queue_everything(None)? == Flow::Continue {
-            if matches!(self.form, Form::Mcap { .. }) {
-                let closing = self.file.closing();
-                let _ = self.put(&closing)?;
-            }
-            #[cfg(feature = "parquet")]
-            if let Form::Parquet(table) = &mut self.form {
-                let closing = table.closing();
-                let _ = self.put_packed(closing)?;
+            match self.form.as_mut().map(|form| form.closing()) {
+                Some(Ok(closing)) if !closing.is_empty() => {
+                    let _ = self.put(&closing)?;
+                }
+                Some(Err(source)) => return Err(self.failed(source)),
+                _ => {}
             }
             if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed)
                 && output.finish()? == Flow::Continue
@@ -380,9 +343,9 @@ impl Sink {
             path: self.path.clone(),
             bytes: self.bytes,
             samples: self.samples,
-            messages: match self.form {
-                Form::Mcap { .. } => self.file.messages(),
-                _ => self.messages,
+            messages: match self.form.as_ref().and_then(|form| form.messages()) {
+                Some(messages) => messages,
+                None => self.messages,
             },
             stamps_out_of_range: self.stamps_out_of_range,
             closed,
@@ -424,8 +387,8 @@ impl Sink {
         };
         if matches!(flow, Ok(Flow::Continue)) {
             self.bytes += bytes.len() as u64;
-            if matches!(self.form, Form::Mcap { .. }) {
-                self.file.account(bytes);
+            if let Some(form) = &mut self.form {
+                form.account(bytes);
             }
         }
         self.note(flow)
@@ -501,14 +464,18 @@ impl Sink {
         let used = std::mem::take(&mut self.used);
         self.queued_copies = 0;
         let mut slots = std::mem::take(&mut self.slots);
-        let form = &self.form;
+        let form = self.form.as_deref();
+        let encode = |slot: &mut Slot| {
+            slot.text.clear();
+            if let Some(form) = form {
+                form.encode(slot);
+            }
+        };
         match pool {
-            Some(pool) if used > 1 => pool.install(|| {
-                slots[..used]
-                    .par_iter_mut()
-                    .for_each(|slot| slot.encode(form));
-            }),
-            _ => slots[..used].iter_mut().for_each(|slot| slot.encode(form)),
+            Some(pool) if used > 1 => {
+                pool.install(|| slots[..used].par_iter_mut().for_each(encode));
+            }
+            _ => slots[..used].iter_mut().for_each(encode),
         }
         let mut flow = Ok(Flow::Continue);
         for slot in &mut slots[..used] {
@@ -523,38 +490,32 @@ impl Sink {
 
     fn emit(&mut self, slot: &mut Slot) -> Result<Flow> {
         if let Some(source) = slot.outcome.take() {
-            let path = self.named();
-            return self.note(Err(Error::Write { path, source }));
-        }
-        if let Form::Mcap { compression, .. } = self.form {
-            self.file.book(&slot.chunk, compression);
-            self.stamps_out_of_range += slot.chunk.stamps_out_of_range;
-            for part in slot.chunk.parts() {
-                if self.put(part)? == Flow::Closed {
-                    return Ok(Flow::Closed);
-                }
-            }
-            slot.chunk.clear();
-            return Ok(Flow::Continue);
+            return Err(self.failed(source));
         }
         self.messages += slot.batch.len() as u64;
-        #[cfg(feature = "parquet")]
-        if let Form::Parquet(table) = &mut self.form {
-            let packed = table.push(&slot.batch);
-            return self.put_packed(packed);
+        self.stamps_out_of_range += slot.chunk.stamps_out_of_range;
+        let Some(form) = &mut self.form else {
+            return Ok(Flow::Continue);
+        };
+        let parts = match form.in_order(slot) {
+            Ok(parts) => parts,
+            Err(source) => return Err(self.failed(source)),
+        };
+        for part in parts.into_iter().filter(|part| !part.is_empty()) {
+            if self.put(part)? == Flow::Closed {
+                return Ok(Flow::Closed);
+            }
         }
-        self.put(&slot.text)
+        slot.chunk.clear();
+        Ok(Flow::Continue)
     }
 
-    /// Writes what a table has packed, if it could.
-    #[cfg(feature = "parquet")]
-    fn put_packed(&mut self, packed: std::io::Result<Vec<u8>>) -> Result<Flow> {
-        match packed {
-            Ok(bytes) => self.put(&bytes),
-            Err(source) => {
-                let path = self.named();
-                self.note(Err(Error::Write { path, source }))
-            }
+    /// Error of bytes that could not be made: nothing is written behind it.
+    fn failed(&mut self, source: std::io::Error) -> Error {
+        self.state = State::Failed;
+        Error::Write {
+            path: self.named(),
+            source,
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::cli::serving::{Served, Serving};
 use crate::config::numbers;
 use crate::error::{Error, Result};
 use crate::pipeline::simulate::Simulation;
-use crate::sink::{Options, Target};
+use crate::sink::{Format, Options, Target};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -38,20 +38,24 @@ impl From<ForceArg> for ForceSampling {
     }
 }
 
+/// Help of `-o`.
+fn sinks() -> String {
+    let (samples, truth) = Format::endings_for_samples();
+    let subject = format!("Output for the samples: {samples} ({truth}: the true attitude alone)");
+    crate::cli::sinks(&subject, "", "")
+}
+
 /// Settings of sampling a motion, and of the outputs.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Sampling")]
 pub struct Common {
-    /// Output for the samples: .mcap, .ndjson, .csv or .parquet (.tum: the true attitude alone), - (NDJSON on
-    /// stdout), null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects);
-    /// tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens). May be given
-    /// several times
     #[arg(
         short,
         long = "output",
         value_name = "SINK",
         required_unless_present = "page",
-        help_heading = "Output"
+        help_heading = "Output",
+        help = sinks()
     )]
     pub outputs: Vec<String>,
     /// Replace outputs that exist

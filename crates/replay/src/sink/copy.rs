@@ -4,9 +4,8 @@
 //! messages, attachments and metadata over as they were found. Messages keep their order; a chunk of
 //! them is closed at a fixed size, so the bytes depend on the calls alone.
 
-use super::form::Form;
 use super::mcap::file::McapFile;
-use super::mcap::{self, Attachment, InputChannel, InputMessage, Layout};
+use super::mcap::{self, Attachment, InputChannel, InputMessage, Mcap};
 use super::output::{Flow, Output};
 use super::{MAX_BATCHES, Options, Sink, Target};
 use crate::error::{Error, Result};
@@ -38,11 +37,11 @@ impl Sink {
             ));
         }
         let output = Output::open(target, inputs, options.force)?;
-        let form = Form::Mcap {
-            layout: Layout::default(),
+        let mcap = Mcap {
             compression: options.compression,
+            ..Mcap::default()
         };
-        Sink::begin(output, form, McapFile::default(), &[], &[])
+        Sink::begin(output, Some(Box::new(mcap)), &[], &[])
     }
 
     /// Writes the head of the file, with the profile of the other.
@@ -51,7 +50,9 @@ impl Sink {
     /// [`Error::Write`].
     pub fn copy_header(&mut self, profile: &str) -> Result<Flow> {
         let mut head = Vec::new();
-        self.file.push_header(&mut head, profile);
+        if let Some(file) = self.mcap() {
+            file.push_header(&mut head, profile);
+        }
         self.put(&head)
     }
 
@@ -61,12 +62,13 @@ impl Sink {
     /// # Errors
     /// [`Error::Write`]; [`Error::Usage`] when there are more than MCAP can number.
     pub fn copy_channel(&mut self, channel: &InputChannel<'_>) -> Result<CopiedChannel> {
-        if !matches!(self.form, Form::Mcap { .. }) || !self.is_open()? {
+        let is_open = self.is_open()?;
+        let Some(file) = self.mcap().filter(|_| is_open) else {
             return Ok(CopiedChannel(0));
-        }
+        };
         // The declaration is written at once, so it stands before every chunk that needs it.
         let mut records = Vec::new();
-        let id = mcap::declare_copy(&mut self.file, &mut records, channel)?;
+        let id = mcap::declare_copy(file, &mut records, channel)?;
         let _ = self.put(&records)?;
         Ok(CopiedChannel(id))
     }
@@ -81,7 +83,7 @@ impl Sink {
         message: &InputMessage<'_>,
         pool: &ThreadPool,
     ) -> Result<Flow> {
-        if !matches!(self.form, Form::Mcap { .. }) {
+        if self.mcap().is_none() {
             return Ok(Flow::Continue);
         }
         if !self.is_open()? {
@@ -125,15 +127,21 @@ impl Sink {
         pool: &ThreadPool,
         push: impl FnOnce(&mut McapFile, &mut Vec<u8>),
     ) -> Result<Flow> {
-        if !matches!(self.form, Form::Mcap { .. }) {
+        if self.mcap().is_none() {
             return Ok(Flow::Continue);
         }
         if self.flush(pool)? == Flow::Closed {
             return Ok(Flow::Closed);
         }
         let mut records = Vec::new();
-        push(&mut self.file, &mut records);
+        if let Some(file) = self.mcap() {
+            push(file, &mut records);
+        }
         self.put(&records)
+    }
+
+    fn mcap(&mut self) -> Option<&mut McapFile> {
+        self.form.as_mut()?.mcap()
     }
 
     /// Moves the copied messages into the queue.

@@ -2,12 +2,15 @@
 //!
 //! The names of the columns are those that [`strapd_recording::table`] reads.
 
+use super::form::{Form, Opening, Slot};
+use super::stream::{Content, Stream};
 use super::text::{push_f64, push_i64, push_status};
+use crate::error::Result;
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are
 /// turned about z, then y, then x (ZYX).
-pub(super) const HEADER: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
+const HEADER: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
 
 /// The first row over samples of a gyro. Rates in rad/s (delta angles in rad), specific force in
 /// m/s^2; `qw,qx,qy,qz` is the orientation that goes with the sample, where there is one.
@@ -15,8 +18,41 @@ pub const RAW_HEADER: &[u8] =
     b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
 
 /// The same over samples of a synthetic gyro, whose stamps may be wrong: the orientation is the truth at the true instant.
-pub(super) const SYNTHETIC_HEADER: &[u8] =
+const SYNTHETIC_HEADER: &[u8] =
     b"stamp_ns,true_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
+
+/// Rows, with what is in the last column of each.
+#[derive(Debug)]
+struct Rows(String);
+
+/// Begins a table of the one stream that has rows in it.
+pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn Form>> {
+    let mut streams = opening.streams.iter();
+    let stream = streams.find(|s| s.content != Content::Truth);
+    let (header, last) = match stream.map(|s| (s.content, s.world_axes.clone())) {
+        Some((Content::Samples(kind), _)) => (SYNTHETIC_HEADER, kind.name().to_owned()),
+        Some((_, world)) => (HEADER, world),
+        None => (HEADER, String::new()),
+    };
+    head.extend_from_slice(header);
+    Ok(Box::new(Rows(last)))
+}
+
+impl Form for Rows {
+    fn encode(&self, slot: &mut Slot) {
+        for sample in &slot.batch.samples {
+            push_row(&mut slot.text, sample, &self.0);
+        }
+        for sample in &slot.batch.raw {
+            push_raw_row(&mut slot.text, sample, &self.0);
+        }
+    }
+
+    /// The truth has no rows.
+    fn leaves_out(&self, stream: &Stream) -> bool {
+        stream.content == Content::Truth
+    }
+}
 
 /// Appends one row with its line end; what is absent is an empty cell. `kind` is what the sample means.
 pub fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample, kind: &str) {
@@ -39,7 +75,7 @@ pub fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample, kind: &str) {
 }
 
 /// Appends one row with its line end. Several status names are joined by `|`; `world` is what it is relative to.
-pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, world: &str) {
+fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, world: &str) {
     push_i64(out, sample.stamp.0);
     let q = sample.q_nb.wxyz();
     let [roll, pitch, yaw] = roll_pitch_yaw(q).map(f64::to_degrees);

@@ -3,30 +3,72 @@
 //! A stage of its own because this is the part that runs on every thread at once: what a batch
 //! becomes depends on nothing but the batch.
 
+use super::Options;
 use super::batch::Batch;
-use super::csv;
-use super::json::Objects;
-use super::mcap::Layout;
-use super::mcap::chunk::{Chunk, Compression};
-#[cfg(feature = "parquet")]
-use super::parquet::Table;
-use super::tum;
+use super::json::Profile;
+use super::mcap::chunk::Chunk;
+use super::mcap::file::McapFile;
+use super::stream::{Provenance, Stream};
+use std::fmt::Debug;
+use std::io;
 
-/// Form in which a batch becomes bytes.
+/// Precision of the numbers of a table in Parquet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Precision {
+    /// Every bit.
+    #[default]
+    Double,
+    /// 24 bits: attitudes to some 1e-7 rad, in half the size.
+    Single,
+}
+
+/// Facts of a run that a form begins with.
 #[derive(Debug)]
-pub(super) enum Form {
-    Mcap {
-        layout: Layout,
-        compression: Compression,
-    },
-    Ndjson(Vec<Objects>),
-    /// CSV, with what is in the last column of every row.
-    Csv(String),
-    Tum,
-    /// Rows are gathered, and so packed where batches are written in order.
-    #[cfg(feature = "parquet")]
-    Parquet(Box<Table>),
-    Null,
+pub(super) struct Opening<'a> {
+    pub(super) options: Options,
+    pub(super) profile: Profile,
+    pub(super) streams: &'a [Stream],
+    pub(super) provenance: &'a Provenance,
+}
+
+/// Form in which batches become bytes.
+pub(super) trait Form: Debug + Send + Sync {
+    /// Makes bytes of a batch, whose text is empty. The parallel part: nothing here depends on any other batch.
+    fn encode(&self, slot: &mut Slot);
+
+    /// Bytes that an encoded batch puts into the output, in the order of the batches.
+    ///
+    /// # Errors
+    /// They cannot be made.
+    fn in_order<'s>(&mut self, slot: &'s mut Slot) -> io::Result<[&'s [u8]; 3]> {
+        Ok([&slot.text, &[], &[]])
+    }
+
+    /// Bytes behind the last batch.
+    ///
+    /// # Errors
+    /// They cannot be made.
+    fn closing(&mut self) -> io::Result<Vec<u8>> {
+        Ok(Vec::new())
+    }
+
+    /// Whether nothing of this stream has a place.
+    fn leaves_out(&self, _: &Stream) -> bool {
+        false
+    }
+
+    /// Counts bytes that were written.
+    fn account(&mut self, _: &[u8]) {}
+
+    /// Messages written, where these are others than its samples.
+    fn messages(&self) -> Option<u64> {
+        None
+    }
+
+    /// The MCAP it is, which takes records of another.
+    fn mcap(&mut self) -> Option<&mut McapFile> {
+        None
+    }
 }
 
 /// One batch on its way into bytes.
@@ -36,45 +78,5 @@ pub(super) struct Slot {
     pub(super) batch: Batch,
     pub(super) chunk: Chunk,
     pub(super) text: Vec<u8>,
-    pub(super) outcome: Option<std::io::Error>,
-}
-
-impl Slot {
-    /// The parallel part: nothing here depends on any other batch.
-    pub(super) fn encode(&mut self, form: &Form) {
-        self.text.clear();
-        match form {
-            Form::Mcap {
-                layout,
-                compression,
-            } => {
-                // Without samples the chunk holds copied messages.
-                if !self.batch.is_empty() {
-                    layout.fill(&mut self.chunk, &self.batch);
-                }
-                self.outcome = self.chunk.seal(*compression).err();
-            }
-            Form::Ndjson(objects) => {
-                if let Some(objects) = objects.get(self.batch.stream) {
-                    objects.push(&mut self.text, &self.batch);
-                }
-            }
-            Form::Csv(last) => {
-                for sample in &self.batch.samples {
-                    csv::push_row(&mut self.text, sample, last);
-                }
-                for sample in &self.batch.raw {
-                    csv::push_raw_row(&mut self.text, sample, last);
-                }
-            }
-            Form::Tum => {
-                for sample in &self.batch.samples {
-                    tum::push_row(&mut self.text, sample);
-                }
-            }
-            #[cfg(feature = "parquet")]
-            Form::Parquet(_) => {}
-            Form::Null => {}
-        }
-    }
+    pub(super) outcome: Option<io::Error>,
 }

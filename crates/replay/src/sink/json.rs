@@ -4,14 +4,24 @@
 //! copies and ten floats. Floats are the shortest decimals that read back to the same bits.
 //! JSON has no NaN: what is not finite is `null`.
 
-use super::batch::Batch;
+use super::form::{Form, Opening, Slot};
 use super::plot::PlotObject;
 use super::stream::{Content, Stream};
-use super::target::Profile;
 use super::text::{
     push_array3, push_f64, push_i64, push_stamp, push_status, push_string, push_u64,
 };
+use crate::error::Result;
 use strapd_attitude::record::{AttitudeSample, RawSample, SampleKind};
+
+/// Form of the objects sent to somebody.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Profile {
+    /// The lines of NDJSON.
+    #[default]
+    Lines,
+    /// Form that PlotJuggler's UDP server reads with its JSON protocol.
+    PlotJuggler,
+}
 
 /// The lines of one stream.
 #[derive(Debug)]
@@ -56,14 +66,30 @@ impl Objects {
         }
         out.push(b'\n');
     }
+}
 
-    /// Appends a line a sample.
-    pub(super) fn push(&self, out: &mut Vec<u8>, batch: &Batch) {
+/// Lines of every stream.
+#[derive(Debug)]
+struct Lines(Vec<Objects>);
+
+/// Begins lines of objects.
+pub(super) fn begin(opening: &Opening<'_>, _: &mut Vec<u8>) -> Result<Box<dyn Form>> {
+    let streams = opening.streams.iter();
+    let objects = streams.map(|s| Objects::new(s, opening.profile));
+    Ok(Box::new(Lines(objects.collect())))
+}
+
+impl Form for Lines {
+    fn encode(&self, slot: &mut Slot) {
+        let Slot { batch, text, .. } = slot;
+        let Some(objects) = self.0.get(batch.stream) else {
+            return;
+        };
         for (seq, sample) in (batch.first..).zip(&batch.samples) {
-            self.push_attitude(out, seq, sample);
+            objects.push_attitude(text, seq, sample);
         }
         for (seq, sample) in (batch.first..).zip(&batch.raw) {
-            self.push_raw(out, seq, sample);
+            objects.push_raw(text, seq, sample);
         }
     }
 }

@@ -13,12 +13,15 @@ pub(super) mod record;
 mod schemas;
 
 use super::batch::Batch;
+use super::form::{Form, Opening, Slot};
 use super::json::{AttObject, FrameTransform};
 use super::stream::{ChildFrames, Content, Provenance, Stream, named_frame, parent_frame};
 use crate::error::{Error, Result};
-use chunk::Chunk;
+use chunk::{Chunk, Compression};
+pub use file::Attachment;
 use file::McapFile;
 use std::collections::BTreeMap;
+use std::io;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::{COPY_INPUT, ENCODING};
@@ -88,19 +91,59 @@ pub struct InputMessage<'a> {
     pub data: &'a [u8],
 }
 
-/// A file carried inside another log, for a copy of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Attachment<'a> {
-    /// Time at which it was recorded, ns.
-    pub log_time: u64,
-    /// Time at which it was made, ns.
-    pub create_time: u64,
-    /// Name.
-    pub name: &'a str,
-    /// Media type.
-    pub media_type: &'a str,
-    /// Bytes.
-    pub data: &'a [u8],
+/// An MCAP, of our streams or a copy of another.
+#[derive(Debug, Default)]
+pub(super) struct Mcap {
+    pub(super) file: McapFile,
+    pub(super) layout: Layout,
+    pub(super) compression: Compression,
+}
+
+/// Begins an MCAP.
+pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn Form>> {
+    let Opening {
+        options,
+        streams,
+        provenance,
+        ..
+    } = opening;
+    let mut file = McapFile::default();
+    Ok(Box::new(Mcap {
+        layout: Layout::begin(&mut file, head, options.encoding, streams, provenance)?,
+        compression: options.compression,
+        file,
+    }))
+}
+
+impl Form for Mcap {
+    fn encode(&self, slot: &mut Slot) {
+        // Without samples the chunk holds copied messages.
+        if !slot.batch.is_empty() {
+            self.layout.fill(&mut slot.chunk, &slot.batch);
+        }
+        slot.outcome = slot.chunk.seal(self.compression).err();
+    }
+
+    fn in_order<'s>(&mut self, slot: &'s mut Slot) -> io::Result<[&'s [u8]; 3]> {
+        self.file.book(&slot.chunk, self.compression);
+        Ok(slot.chunk.parts())
+    }
+
+    fn closing(&mut self) -> io::Result<Vec<u8>> {
+        Ok(self.file.closing())
+    }
+
+    fn account(&mut self, bytes: &[u8]) {
+        self.file.account(bytes);
+    }
+
+    fn messages(&self) -> Option<u64> {
+        Some(self.file.messages())
+    }
+
+    fn mcap(&mut self) -> Option<&mut McapFile> {
+        Some(&mut self.file)
+    }
 }
 
 /// Layout of each stream's messages.
@@ -139,7 +182,7 @@ enum Messages {
 
 impl Layout {
     /// Declares every stream's channels; the head of the file goes to `out`.
-    pub(super) fn begin(
+    fn begin(
         file: &mut McapFile,
         out: &mut Vec<u8>,
         encoding: Encoding,
@@ -259,7 +302,7 @@ impl Layout {
 
     /// Fills an empty chunk. A transform with the stamp of the one before is left out: tf2 warns
     /// about each.
-    pub(super) fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
+    fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
         let Some(messages) = self.streams.get(batch.stream) else {
             return;
         };

@@ -8,8 +8,8 @@
 mod column;
 
 use super::batch::Batch;
+use super::form::{Form, Opening, Precision, Slot};
 use super::stream::{Content, Provenance, Stream};
-use super::target::Precision;
 use column::{Clock, Column, Values};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::data_type::ByteArray;
@@ -36,7 +36,7 @@ enum Rows {
 
 /// A table that is being written.
 #[derive(Debug)]
-pub(super) struct Table {
+struct Table {
     rows: Rows,
     columns: Vec<Column>,
     names: Vec<ByteArray>,
@@ -47,9 +47,48 @@ pub(super) struct Table {
     writer: Option<SerializedFileWriter<Vec<u8>>>,
 }
 
+/// Begins a table. Nothing stands before the first group.
+pub(super) fn begin(opening: &Opening<'_>, _: &mut Vec<u8>) -> crate::error::Result<Box<dyn Form>> {
+    let Opening {
+        options,
+        streams,
+        provenance,
+        ..
+    } = opening;
+    let table = Table::new(streams, provenance, options.precision);
+    Ok(Box::new(table))
+}
+
+impl Form for Table {
+    /// Rows are gathered, and so packed where batches are written in order.
+    fn encode(&self, _: &mut Slot) {}
+
+    fn in_order<'s>(&mut self, slot: &'s mut Slot) -> std::io::Result<[&'s [u8]; 3]> {
+        slot.text = self.push(&slot.batch)?;
+        Ok([&slot.text, &[], &[]])
+    }
+
+    /// The rows that wait, and the footer: without it nothing reads the file.
+    fn closing(&mut self) -> std::io::Result<Vec<u8>> {
+        let mut out = Vec::new();
+        if self.waiting > 0 || self.writer.is_none() {
+            self.pack(&mut out).map_err(std::io::Error::other)?;
+        }
+        if let Some(writer) = self.writer.take() {
+            out.append(&mut writer.into_inner().map_err(std::io::Error::other)?);
+        }
+        Ok(out)
+    }
+
+    fn leaves_out(&self, stream: &Stream) -> bool {
+        let is_samples = matches!(stream.content, Content::Samples(_));
+        is_samples != (self.rows == Rows::Samples)
+    }
+}
+
 impl Table {
     /// An empty table for `streams`.
-    pub(super) fn new(streams: &[Stream], provenance: &Provenance, precision: Precision) -> Table {
+    fn new(streams: &[Stream], provenance: &Provenance, precision: Precision) -> Table {
         let samples = |s: &Stream| matches!(s.content, Content::Samples(_));
         let (rows, columns) = match streams.iter().any(samples) {
             true => (Rows::Samples, sample_columns(precision)),
@@ -65,17 +104,11 @@ impl Table {
         }
     }
 
-    /// Whether rows of this stream have no place in the table.
-    pub(super) fn leaves_out(&self, stream: &Stream) -> bool {
-        let is_samples = matches!(stream.content, Content::Samples(_));
-        is_samples != (self.rows == Rows::Samples)
-    }
-
     /// Takes a batch; the bytes of what became full by it.
     ///
     /// # Errors
     /// It cannot be packed.
-    pub(super) fn push(&mut self, batch: &Batch) -> std::io::Result<Vec<u8>> {
+    fn push(&mut self, batch: &Batch) -> std::io::Result<Vec<u8>> {
         let mut out = Vec::new();
         let mut rest = batch.samples.as_slice();
         while !rest.is_empty() {
@@ -88,21 +121,6 @@ impl Table {
         for sample in &batch.raw {
             self.push_sample(batch.stream, sample);
             self.pack_when_full(&mut out)?;
-        }
-        Ok(out)
-    }
-
-    /// The rows that wait, and the footer: without it nothing reads the file.
-    ///
-    /// # Errors
-    /// As [`Table::push`].
-    pub(super) fn closing(&mut self) -> std::io::Result<Vec<u8>> {
-        let mut out = Vec::new();
-        if self.waiting > 0 || self.writer.is_none() {
-            self.pack(&mut out).map_err(std::io::Error::other)?;
-        }
-        if let Some(writer) = self.writer.take() {
-            out.append(&mut writer.into_inner().map_err(std::io::Error::other)?);
         }
         Ok(out)
     }

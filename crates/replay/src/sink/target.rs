@@ -1,5 +1,7 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
+use super::format::Format;
+use super::json::Profile;
 use crate::address::Address;
 use crate::error::{Error, Result};
 use crate::sink::address::Listen;
@@ -8,32 +10,6 @@ use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
 use strapd_recording::elsewhere::SCHEMES;
-
-/// Format of a file or pipe.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Format {
-    /// An indexed MCAP file.
-    Mcap,
-    /// One `ATT` object per line.
-    Ndjson,
-    /// One row per sample under a header row.
-    Csv,
-    /// A trajectory as `evo` reads it.
-    Tum,
-    /// A table in Parquet.
-    #[cfg(feature = "parquet")]
-    Parquet,
-}
-
-/// Precision of the numbers of a table in Parquet.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Precision {
-    /// Every bit.
-    #[default]
-    Double,
-    /// 24 bits: attitudes to some 1e-7 rad, in half the size.
-    Single,
-}
 
 /// Target of the output.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -70,16 +46,11 @@ pub enum Target {
 }
 
 /// The list every message about an unknown sink ends with.
-const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), FILE.parquet (with the feature parquet), s3://BUCKET/KEY, gs://BUCKET/KEY, az://CONTAINER/KEY with such an ending (with the feature object-store), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
-
-/// Form of the objects sent to somebody.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Profile {
-    /// The lines of NDJSON.
-    #[default]
-    Lines,
-    /// Form that PlotJuggler's UDP server reads with its JSON protocol.
-    PlotJuggler,
+fn known() -> String {
+    let files = Format::files();
+    format!(
+        "known sinks: {files}, s3://BUCKET/KEY, gs://BUCKET/KEY, az://CONTAINER/KEY with such an ending (with the feature object-store), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)"
+    )
 }
 
 impl Target {
@@ -93,7 +64,7 @@ impl Target {
             "null:" => return Ok(Target::Null),
             "" => {
                 return Err(Error::usage(
-                    Diagnostic::new("-o: the name is empty").help(KNOWN),
+                    Diagnostic::new("-o: the name is empty").help(known()),
                 ));
             }
             _ => {}
@@ -108,7 +79,7 @@ impl Target {
         let refuse = |what: &str| {
             let shown = Address::from(text);
             Err(Error::usage(
-                Diagnostic::new(format!("-o {shown}: {what}")).help(KNOWN),
+                Diagnostic::new(format!("-o {shown}: {what}")).help(known()),
             ))
         };
         let (address, query) = match rest.split_once('?') {
@@ -178,7 +149,10 @@ impl Target {
         };
         match format {
             Some(format) => Ok(Target::Store { address, format }),
-            None => refuse("the ending of its key is no format that is written", KNOWN),
+            None => refuse(
+                "the ending of its key is no format that is written",
+                &known(),
+            ),
         }
     }
 
@@ -196,49 +170,30 @@ impl Target {
     /// # Errors
     /// [`Error::Usage`] when the extension is missing or unknown.
     pub fn from_path(path: &Path) -> Result<Target> {
-        let extension = path
-            .extension()
-            .map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let format = match extension.as_deref() {
-            Some("mcap") => Format::Mcap,
-            Some("ndjson" | "jsonl") => Format::Ndjson,
-            Some("csv") => Format::Csv,
-            Some("tum") => Format::Tum,
-            #[cfg(feature = "parquet")]
-            Some("parquet" | "pq") => Format::Parquet,
-            #[cfg(not(feature = "parquet"))]
-            Some("parquet" | "pq") => {
-                let name = path.display();
-                let csv = path.with_extension("csv");
-                return Err(Error::usage(
-                    Diagnostic::new(format!(
-                        "-o {name}: this strapd was built without the feature parquet"
-                    ))
-                    .help(format!(
-                        "build it with that feature, or write -o {}, which polars, pandas and duckdb read",
-                        csv.display()
-                    ))
-                ));
-            }
-            Some(other) => {
-                return Err(Error::usage(
-                    Diagnostic::new(format!(
-                        "-o {}: unknown extension `.{other}`",
-                        path.display()
-                    ))
-                    .help(KNOWN),
-                ));
-            }
-            None => {
-                return Err(Error::usage(
-                    Diagnostic::new(format!(
-                        "-o {}: no extension, so the format is unknown",
-                        path.display()
-                    ))
-                    .help(KNOWN),
-                ));
-            }
+        let refuse = |what: String, help: String| {
+            let what = format!("-o {}: {what}", path.display());
+            Err(Error::usage(Diagnostic::new(what).help(help)))
         };
+        let Some(ending) = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase())
+        else {
+            let what = "no extension, so the format is unknown".to_owned();
+            return refuse(what, known());
+        };
+        let Some(format) = Format::of_ending(&ending) else {
+            return refuse(format!("unknown extension `.{ending}`"), known());
+        };
+        if let Some(feature) = format.missing() {
+            let (instead, readers) = feature.instead;
+            return refuse(
+                format!("this strapd was built without the feature {}", feature.name),
+                format!(
+                    "build it with that feature, or write -o {}, which {readers} read",
+                    path.with_extension(instead).display()
+                ),
+            );
+        }
         Ok(Target::File {
             path: path.to_path_buf(),
             format,

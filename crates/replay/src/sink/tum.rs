@@ -7,15 +7,34 @@
 //! Sturm, Engelhard, Endres, Burgard, Cremers, A Benchmark for the Evaluation of RGB-D SLAM Systems (IROS 2012): the
 //! format of its ground truth.
 
+use super::form::{Form, Opening, Slot};
 use super::text::push_f64;
+use crate::error::Result;
 use strapd_attitude::record::AttitudeSample;
 
 /// The first row, a comment to who reads it.
-pub(super) const HEADER: &[u8] = b"# timestamp tx ty tz qx qy qz qw\n";
+const HEADER: &[u8] = b"# timestamp tx ty tz qx qy qz qw\n";
+
+#[derive(Debug)]
+struct Trajectory;
+
+/// Begins a trajectory.
+pub(super) fn begin(_: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn Form>> {
+    head.extend_from_slice(HEADER);
+    Ok(Box::new(Trajectory))
+}
+
+impl Form for Trajectory {
+    fn encode(&self, slot: &mut Slot) {
+        for sample in &slot.batch.samples {
+            push_row(&mut slot.text, sample);
+        }
+    }
+}
 
 /// Appends one row with its line end: the stamp to the nanosecond, floats as the shortest decimals that read back to
 /// the same bits. An attitude that is no number is left out: the form has no word for it.
-pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {
+fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {
     let [w, x, y, z] = sample.q_nb.wxyz();
     if ![w, x, y, z].iter().all(|c| c.is_finite()) {
         return;

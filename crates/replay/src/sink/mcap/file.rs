@@ -3,7 +3,6 @@
 //! Keeps what the summary at the end needs. Schemas and channels stand outside the chunks, before
 //! the first message that uses them: a damaged or lost chunk takes only its own messages with it.
 
-use super::Attachment;
 use super::chunk::{Chunk, Compression};
 use super::record::{
     ATTACHMENT, ATTACHMENT_INDEX, Body, CHANNEL, CHUNK_INDEX, Channel, DATA_END, FOOTER, HEADER,
@@ -11,6 +10,21 @@ use super::record::{
 };
 
 use std::collections::BTreeMap;
+
+/// A file carried inside another log, for a copy of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Attachment<'a> {
+    /// Time at which it was recorded, ns.
+    pub log_time: u64,
+    /// Time at which it was made, ns.
+    pub create_time: u64,
+    /// Name.
+    pub name: &'a str,
+    /// Media type.
+    pub media_type: &'a str,
+    /// Bytes.
+    pub data: &'a [u8],
+}
 
 /// The bookkeeping of a file being written.
 #[derive(Debug, Default)]
