@@ -56,7 +56,7 @@ pub(crate) enum Reading {
     Database,
     /// Payloads of a camera, which an index may tell of.
     Telemetry,
-    /// From its front to its end, transcribed to records by what this makes.
+    /// Bytes from front to end, transcribed to records by what this makes.
     Transcribed(fn() -> Box<dyn Transcribe>),
 }
 
@@ -217,7 +217,7 @@ impl Format {
         self.row().name
     }
 
-    /// Who cuts it into what.
+    /// Reader that cuts it.
     pub(crate) fn reading(self) -> Reading {
         self.row().reading
     }

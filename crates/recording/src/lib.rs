@@ -35,7 +35,6 @@
 //! | [`delimited`] | rows of a table, strapd's own or another maker's -> raw samples | pure |
 //! | `columns` | what columns of tables are called, and what a user says of them | pure |
 //! | `parquet` | tables in Parquet -> the rows of a table, as text | I/O |
-//! | `problem` | what was wrong with a log, and how much was lost by it | pure |
 //! | `records` | records as MCAP has them, which other containers are transcribed to | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
 //! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
@@ -71,7 +70,6 @@ mod parquet;
 #[path = "parquet/absent.rs"]
 mod parquet;
 pub mod pool;
-mod problem;
 pub mod recognise;
 pub mod recording;
 mod records;

@@ -36,7 +36,7 @@ mod survey;
 mod walk;
 mod workers;
 
-pub use crate::problem::{Problem, ProblemKind, Problems};
+pub use crate::records::problem::{Problem, ProblemKind, Problems};
 pub use block::Compression;
 use block::Payload;
 pub use channels::{Channel, Schema};

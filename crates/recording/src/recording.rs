@@ -14,7 +14,7 @@
 //! | file | |
 //! |---|---|
 //! | [`input`], `folder`, `line_input`, [`incoming`] | what can be read again, the recording in a folder, lines and rows, what comes once |
-//! | [`opened`], `text_log`, [`log_channel`], [`sources`] | what is in a log, or in a text; what a channel can serve as; who speaks on a topic |
+//! | [`opened`], `text_log`, [`log_channel`], [`payload_type`], [`sources`] | what is in a log, or in a text; what a channel can serve as; the type of its payloads; who speaks on a topic |
 //! | [`selection`], [`topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
 //! | `samples`, [`topic_reading`], [`sensor_lines`] | all samples that are selected, one topic, one sensor of a text that comes once |
@@ -35,6 +35,7 @@ pub mod log_channel;
 pub mod made_before;
 pub mod opened;
 mod parts;
+pub mod payload_type;
 mod samples;
 pub mod selection;
 pub mod sensor_lines;

@@ -4,6 +4,7 @@
 
 mod bytes;
 pub(crate) mod imu;
+pub(crate) mod problem;
 pub(crate) mod transcript;
 
 pub(crate) use bytes::{Bytes, HEAD, head_at};

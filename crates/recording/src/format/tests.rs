@@ -5,8 +5,8 @@
 use super::*;
 use crate::mcap::{Reader, WalkOptions, survey};
 use crate::pool::Pool;
-use crate::problem::{ProblemKind, Problems};
 use crate::records::imu;
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::{Step, Transcript};
 use crate::{Recording, Selection, Warn};
 use std::ops::ControlFlow;

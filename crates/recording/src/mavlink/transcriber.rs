@@ -6,8 +6,8 @@
 use super::frame::{Checked, Frame, LONGEST, frame, is_log};
 use super::message;
 use crate::decode::known_definition;
-use crate::problem::{ProblemKind, Problems};
 use crate::records::imu;
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::{Step, Transcribe, Transcript};
 use std::collections::BTreeMap;
 

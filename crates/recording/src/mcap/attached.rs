@@ -4,7 +4,7 @@
 //! an attachment carries its own, a metadata record has none and is judged by its lengths.
 
 use super::record::{AttachmentRecord, Record, op};
-use crate::problem::ProblemKind;
+use crate::records::problem::ProblemKind;
 
 /// Bytes of an attachment's fields but for name, media type and data: two times, two lengths of
 /// four bytes and one of eight, and behind them the CRC.

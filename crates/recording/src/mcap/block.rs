@@ -7,7 +7,7 @@ mod bag;
 
 use super::input::{Held, LogFile, Stretch};
 use super::record::op;
-use crate::problem::ProblemKind;
+use crate::records::problem::ProblemKind;
 use crate::records::transcript::Transcript;
 use crate::records::{HEAD, head_at};
 use std::io::{self, BufReader};

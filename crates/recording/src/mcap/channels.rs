@@ -5,7 +5,8 @@
 //! so that messages of two topics are never mixed under one id.
 
 use super::record::{ChannelRecord, SchemaRecord, op};
-use crate::problem::{ProblemKind, Problems};
+use crate::format::Format;
+use crate::records::problem::{ProblemKind, Problems};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -40,6 +41,8 @@ pub struct Channel {
     pub schema: Option<Arc<Schema>>,
     /// Schema id in the file; 0 for none.
     pub schema_id: u16,
+    /// Format of the lines or rows that stand for its messages; `None` where there are messages.
+    pub text: Option<Format>,
 }
 
 impl Schema {
@@ -265,6 +268,7 @@ impl<D> Table<D> {
             metadata: text_map(&r.metadata),
             schema,
             schema_id: r.schema_id,
+            text: None,
         });
         let choice = select(&channel);
         let id = usize::from(r.id);

@@ -12,7 +12,7 @@ use super::index::Passed;
 use super::scan::{Besides, Facts, Item, Scanner};
 use super::{Payload, Reader};
 use crate::format::Reading;
-use crate::problem::Problems;
+use crate::records::problem::Problems;
 use std::fmt::Debug;
 use std::io;
 

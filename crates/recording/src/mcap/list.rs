@@ -10,7 +10,7 @@ use super::scan::{Besides, Item};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::{HEAD, head_at};
 use std::ops::ControlFlow;
 

@@ -6,7 +6,7 @@
 use super::channels::{Channel, NONE, Table};
 use super::order::{Batch, PIECE};
 use super::record::{MessageRecord, op};
-use crate::problem::ProblemKind;
+use crate::records::problem::ProblemKind;
 use crate::records::{HEAD, head_at};
 use std::collections::BTreeMap;
 use std::sync::Arc;

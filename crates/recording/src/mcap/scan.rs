@@ -14,7 +14,7 @@ use super::input::{Held, Input, Tape};
 use super::record::{MAGIC, Record, op};
 use super::resync;
 use crate::format::Format;
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::{HEAD, head_at};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;

@@ -16,7 +16,7 @@ use super::walk::{WalkOptions, walk};
 use super::{Reader, read_error};
 use crate::error::{Error, Result};
 use crate::format::Format;
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;

@@ -18,7 +18,7 @@ use super::survey::{Survey, fallback};
 use super::workers::{Shared, Ticket};
 use super::{Reader, read_error};
 use crate::error::Result;
-use crate::problem::Problems;
+use crate::records::problem::Problems;
 use state::Course;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;

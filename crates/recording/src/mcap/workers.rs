@@ -8,7 +8,7 @@ use super::block::{Block, Buffers, Kind};
 use super::channels::{NONE, Table};
 use super::messages::{Message, Met, Place, Stop, Tally, pass};
 use super::order::{Batch, Order};
-use crate::problem::ProblemKind;
+use crate::records::problem::ProblemKind;
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

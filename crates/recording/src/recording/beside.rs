@@ -183,7 +183,7 @@ fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicO
             });
             TopicOfVectors {
                 topic: known.channel.topic.clone(),
-                described: described(&known.channel),
+                described: described(&known.channel).to_string(),
                 rate_hz: secs
                     .filter(|secs| *secs > 0.0)
                     .map(|secs| known.messages.saturating_sub(1) as f64 / secs),

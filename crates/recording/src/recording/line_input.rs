@@ -1,5 +1,6 @@
 //! Lines of JSON or rows of a table: opened, described, and what is wrong with them in words.
 
+use super::payload_type::PayloadType;
 use crate::decode::{Ambiguous, Options, Undecodable};
 use crate::delimited::Table;
 use crate::error::{Error, Result};
@@ -99,10 +100,10 @@ pub(super) fn is_sure(lines: &Lines<impl Read>, early: usize) -> bool {
 
 /// Text of how a table is read, so that it can be pasted and changed, with the format's name; of anything else that
 /// alone.
-pub(super) fn described(lines: &Lines<impl Read>) -> String {
-    let name = lines.format().name();
-    match lines.table().map(Table::assumed).unwrap_or_default() {
-        "" => name.to_owned(),
-        assumed => format!("{COLUMNS} '{assumed}' [{name}]"),
-    }
+pub(super) fn described(lines: &Lines<impl Read>) -> PayloadType {
+    let besides = match lines.table().map(Table::assumed).unwrap_or_default() {
+        "" => String::new(),
+        assumed => format!("{COLUMNS} '{assumed}'"),
+    };
+    PayloadType::of_text(lines.format(), &besides)
 }

@@ -1,6 +1,7 @@
 //! A channel of a log, with its first messages -> what it can serve as, and its decoder. Pure.
 
 use super::decoders::{Decoders, plain};
+use super::payload_type::PayloadType;
 use super::topics::Candidate;
 use crate::decode::{Decoder, Rank, Role, Stated, Unsupported, role_of};
 use crate::mcap::Channel;
@@ -31,7 +32,7 @@ impl LogChannel {
         Candidate {
             topic: self.channel.topic.clone(),
             of: self.channel.topic.clone(),
-            described: described(&self.channel),
+            described: described(&self.channel).to_string(),
             messages: Some(self.messages),
             rank: self.rank(),
         }
@@ -114,12 +115,8 @@ fn names(payload: &[u8], name: &[u8]) -> bool {
 
 /// `sensor_msgs/msg/Imu [cdr]`, fit for a terminal.
 #[must_use]
-pub fn described(channel: &Channel) -> String {
-    let name = channel
-        .schema
-        .as_deref()
-        .map_or("(no type)", |s| s.name.as_str());
-    crate::text::printable(&format!("{name} [{}]", channel.message_encoding))
+pub fn described(channel: &Channel) -> PayloadType {
+    PayloadType::of(channel)
 }
 
 /// A role as a number: higher is more likely "the IMU" (see [`Candidate::rank`]).

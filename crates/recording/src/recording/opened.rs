@@ -429,7 +429,7 @@ impl Recording {
         rank_of: &dyn Fn(&LogChannel) -> u8,
     ) -> Candidate {
         let first = self.channels_of(source).next();
-        let mut said = first.map_or_else(String::new, |k| described(&k.channel));
+        let mut said = first.map_or_else(String::new, |k| described(&k.channel).to_string());
         if !source.label.is_empty() {
             let publishers = first.map_or_else(String::new, |k| sources::publisher(&k.channel));
             for (what, name) in [

@@ -255,7 +255,7 @@ fn meant(known: &LogChannel) -> String {
             .map_or("no unit", |unit| unit.name());
         format!(" ({}; {unit})", stated.description)
     });
-    described(&known.channel) + &of_text.unwrap_or_default()
+    described(&known.channel).to_string() + &of_text.unwrap_or_default()
 }
 
 /// Whether a channel of a later part is this one: the same publisher, topic and type, and numbers that mean the same.

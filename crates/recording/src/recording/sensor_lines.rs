@@ -7,6 +7,7 @@ use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
 use super::early_besides::{EarlyBesides, are_beside};
 use super::line_input::{are_judged, described, is_sure, no_samples, unclear};
+use super::payload_type::PayloadType;
 use super::selection::Selection;
 use crate::attitude_line::TRUTH_ID;
 use crate::decode::{Class, Undecodable};
@@ -35,7 +36,7 @@ pub struct Sensor {
     /// Name.
     pub name: String,
     /// Text of how its lines are read.
-    pub described: String,
+    pub described: PayloadType,
     /// Meaning of all its samples that its format declares.
     pub declared: Declared,
     /// Notes for the reader of its tables.

@@ -92,7 +92,7 @@ impl TextLog {
         let declared = lines.declared();
         let table = lines.table().cloned();
         let description = match &table {
-            Some(table) if !table.is_own() => described(&lines),
+            Some(table) if !table.is_own() => described(&lines).to_string(),
             _ => "fields by name, in each line".to_owned(),
         };
         let doubt = table.as_ref().and_then(Table::doubt_of_unit);
@@ -405,6 +405,7 @@ fn named(met: Vec<(Key, Met)>, format: Format) -> Vec<(LogChannel, Option<(u64, 
                 metadata: BTreeMap::new(),
                 schema_id: schema.id,
                 schema: Some(Arc::new(schema)),
+                text: Some(format),
             }),
             messages: met.messages,
             first: None,

@@ -4,7 +4,7 @@
 //! channels and messages here, and what follows (definitions, workers, order, counting) cannot tell.
 
 use super::op;
-use crate::problem::Problems;
+use crate::records::problem::Problems;
 use std::fmt::Debug;
 
 /// Records one after another, as they would lie in a chunk.

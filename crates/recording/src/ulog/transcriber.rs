@@ -7,8 +7,8 @@
 use super::format::{Format, Formats, Layout};
 use super::record::{HEAD, LONGEST, Look, head, id, look, pair};
 use super::{HEADER, MAGIC};
-use crate::problem::{ProblemKind, Problems};
 use crate::records::op;
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::{Step, Transcribe, Transcript};
 use std::collections::BTreeMap;
 

@@ -5,7 +5,7 @@
 
 use super::{Compression, PIECE, TOO_MANY, most_messages};
 use crate::bag;
-use crate::problem::ProblemKind;
+use crate::records::problem::ProblemKind;
 use crate::records::transcript::Transcript;
 use std::io::{self, BufRead, Read};
 

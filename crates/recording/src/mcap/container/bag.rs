@@ -12,7 +12,7 @@ use super::super::scan::{Facts, Item};
 use super::Container;
 use crate::bag::{self, Head, op};
 use crate::format::Format;
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
 use crate::records::{HEAD, head_at};
 use std::io;

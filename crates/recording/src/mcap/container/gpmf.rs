@@ -12,7 +12,7 @@ use crate::gpmf::{
     self, ITEM_HEAD, LONGEST, Lasts, MAGIC, Movie, SECOND, Sample, Transcriber, item_length,
     next_device,
 };
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
 use std::io;
 use std::sync::Arc;

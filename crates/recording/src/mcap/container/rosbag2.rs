@@ -10,7 +10,7 @@ use super::super::{Beside, Limits};
 use super::pages::FilePages;
 use super::{Container, Spare};
 use crate::format::Format;
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
 use crate::rosbag2::{Bag, Fault, FaultKind};
 use std::io;

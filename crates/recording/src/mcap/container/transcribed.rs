@@ -9,7 +9,7 @@ use super::super::input::{Input, Tape};
 use super::super::scan::{Facts, Item};
 use super::{Container, Spare};
 use crate::format::Format;
-use crate::problem::Problems;
+use crate::records::problem::Problems;
 use crate::records::transcript::{Transcribe, Transcript};
 use std::io;
 

@@ -8,7 +8,7 @@ use super::super::input::Input;
 use super::super::record::{ChunkHead, op};
 use super::super::resync;
 use super::{Besides, Item, PEEK, SLACK, Scanner, Section};
-use crate::problem::ProblemKind;
+use crate::records::problem::ProblemKind;
 use crate::records::{HEAD, head_at};
 use std::io;
 use std::sync::Arc;

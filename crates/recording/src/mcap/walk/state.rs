@@ -17,7 +17,7 @@ use super::super::survey::Survey;
 use super::super::workers::{Done, Findings, Outcome, Piece, Shared, Ticket, place};
 use super::WalkReport;
 use crate::error::{Error, Result};
-use crate::problem::{ProblemKind, Problems};
+use crate::records::problem::{ProblemKind, Problems};
 use crate::records::{HEAD, head_at};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use crate::problem::Problem;
+use crate::records::problem::Problem;
 
 fn record(kind: u8, body: &[u8]) -> Vec<u8> {
     let mut out = (body.len() as u16).to_le_bytes().to_vec();
