@@ -168,7 +168,7 @@ fn topic_json(looked: &Inspection) -> Value {
     let found = of_samples(looked);
     json!({
         "topic": looked.topic,
-        "decoded_as": looked.described,
+        "decoded_as": looked.described.to_string(),
         "frame_id": looked.frame,
         "samples": q.count,
         "duration_s": q.duration_secs,

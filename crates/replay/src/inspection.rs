@@ -11,8 +11,8 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
 use strapd_attitude::record::{Counts, RawSample};
 use strapd_recording::MadeBefore;
-use strapd_recording::format::Format;
 use strapd_recording::recording::beside::TopicOfVectors;
+use strapd_recording::recording::payload_type::PayloadType;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]
@@ -22,9 +22,7 @@ pub struct Inspection {
     /// The topic.
     pub of: String,
     /// Type and encoding.
-    pub described: String,
-    /// Format of the recording.
-    pub format: Format,
+    pub described: PayloadType,
     /// The frame its first message names.
     pub frame: String,
     /// Meaning of its samples by default.

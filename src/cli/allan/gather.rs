@@ -92,7 +92,7 @@ pub(super) fn gather(
     let Some((known, decoder)) = reading.channels.first() else {
         return Err(unsupported(format!("{topic}: no channel of it").into()));
     };
-    let described = described(&known.channel);
+    let described = described(&known.channel).to_string();
     if !decoder.stated().has_gyro {
         return Err(unsupported(
             Diagnostic::new(format!("{topic} ({described}): carries no body rate"))

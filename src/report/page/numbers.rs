@@ -20,7 +20,7 @@ pub(super) fn topic(topic: &CheckedTopic, noise: Option<&Noise>) -> Value {
     let drawn = run.and_then(|s| s.drawn.as_deref());
     json!({
         "topic": looked.topic,
-        "type": looked.described,
+        "type": looked.described.to_string(),
         "frame": looked.frame,
         "refused": refused.map(ToString::to_string),
         "replay": run.map(|s| s.json()),

@@ -127,8 +127,7 @@ pub(super) fn each(
             Ok(ControlFlow::Continue(()))
         },
     )?;
-    let mut summaries =
-        summarise::topics(run, session.finish_each(pool)?, log.survey.facts.format).into_iter();
+    let mut summaries = summarise::topics(run, session.finish_each(pool)?).into_iter();
     let nothing = || Err(Diagnostic::new("the replay gave nothing"));
     let mut next = || summaries.next().unwrap_or_else(nothing);
     Ok(told

@@ -16,7 +16,6 @@ use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
 use strapd_recording::decode::{self, Options};
-use strapd_recording::format::Format;
 use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::Vectors;
@@ -24,6 +23,7 @@ use strapd_recording::recording::channel_route::{Item, Noticed, Route, Taker};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::recording::opened::AHEAD;
+use strapd_recording::recording::payload_type::PayloadType;
 use strapd_recording::recording::sources::Publisher;
 use strapd_recording::recording::topics::{MOST_TOPICS, PICKED_UNNAMED};
 
@@ -42,8 +42,7 @@ pub struct Looks {
 struct Look {
     topic: String,
     of: String,
-    described: String,
-    format: Format,
+    described: PayloadType,
     frame: String,
     kind_stated: bool,
     resolved: Meaning,
@@ -142,7 +141,6 @@ impl Look {
             topic: self.topic,
             of: self.of,
             described: self.described,
-            format: self.format,
             frame: self.frame,
             resolved: self.resolved,
             kind_stated: self.kind_stated,
@@ -207,8 +205,7 @@ pub(crate) fn look_as(
                 }
             };
             let stream = *begun.get_or_insert_with(|| {
-                let format = log.survey.facts.format;
-                looks.push(begin(source, known, (&decoder, format), plan));
+                looks.push(begin(source, known, &decoder, plan));
                 looks.len() - 1
             });
             let (_, takers) = decoders
@@ -325,12 +322,7 @@ fn wanted<'l>(
     )
 }
 
-fn begin(
-    source: &Publisher,
-    known: &LogChannel,
-    (decoder, format): (&decode::Decoder, Format),
-    plan: &Plan,
-) -> Look {
+fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan: &Plan) -> Look {
     let resolved = Meaning::new(plan, &decoder.stated().declared);
     let first_frame = || {
         let (_, payload) = known.first.as_ref()?;
@@ -340,7 +332,6 @@ fn begin(
         topic: source.name.clone(),
         of: source.topic.clone(),
         described: described(&known.channel),
-        format,
         frame: source
             .frame
             .clone()

@@ -17,7 +17,7 @@ use strapd_attitude::estimate::{Estimator, Meaning, Patience, Plan, Prepared, le
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, RawSample};
 use strapd_recording::Source;
-use strapd_recording::format::Format;
+use strapd_recording::recording::payload_type::PayloadType;
 
 /// The name of samples that have none.
 const NAME: &str = "samples";
@@ -63,7 +63,7 @@ pub fn estimate<E>(
     let found = Found {
         name: NAME.to_owned(),
         output_topic: String::new(),
-        described: DESCRIBED.to_owned(),
+        described: PayloadType::of_memory(DESCRIBED),
         resolved: Meaning::new(plan, &Declared::default()),
         noticed: Arc::default(),
         warnings: Vec::new(),
@@ -110,7 +110,7 @@ pub fn estimate<E>(
     });
     ended.map_err(Stop::Ended)?;
     finished?;
-    let summary = summarise::of_topic(&run, &mut topic, Format::default());
+    let summary = summarise::of_topic(&run, &mut topic);
     Ok(TopicSummary {
         // Without the name that the samples have not.
         calibration: learned(

@@ -21,6 +21,7 @@ use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::{Item, Noticed};
+use strapd_recording::recording::payload_type::PayloadType;
 
 /// One estimated topic of a run.
 #[derive(Debug)]
@@ -30,7 +31,7 @@ pub(super) struct Topic {
     /// Topic of its attitude.
     pub output_topic: String,
     /// Type and encoding.
-    pub described: String,
+    pub described: PayloadType,
     /// Meaning of its samples.
     pub resolved: Meaning,
     /// Decisions made before the first was integrated.
@@ -223,7 +224,7 @@ pub struct Found {
     /// Topic of its attitude.
     pub output_topic: String,
     /// Type and encoding.
-    pub described: String,
+    pub described: PayloadType,
     /// Meaning of its samples.
     pub resolved: Meaning,
     /// Observations in its payloads.

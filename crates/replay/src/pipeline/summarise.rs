@@ -15,7 +15,6 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::SensorCalibration;
 use strapd_attitude::record::Verdict;
 use strapd_recording::Source;
-use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
 
 /// The summary of a run.
@@ -29,7 +28,7 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
         source: run.source.name().display().to_string(),
         topics: topics
             .iter_mut()
-            .map(|topic| of_topic(run, topic, survey.facts.format))
+            .map(|topic| of_topic(run, topic))
             .collect(),
         broken: broken(&outputs),
         reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
@@ -52,26 +51,25 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
 /// Summary of a topic, or the reason why there is none.
 pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
 
-/// Summaries of the topics of a run over a recording of `format`, without outputs, or why one has not what was asked
-/// for.
-pub(super) fn topics(run: &ReplayRequest, ended: Ended, format: Format) -> Vec<Told> {
+/// Summaries of the topics of a run without outputs, or why one has not what was asked for.
+pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<Told> {
     let told = |mut topic: Topic| match unmet(&run.plan, &topic) {
         Some(what) => Err(what),
-        None => Ok(Box::new(of_topic(run, &mut topic, format))),
+        None => Ok(Box::new(of_topic(run, &mut topic))),
     };
     ended.topics.into_iter().map(told).collect()
 }
 
-/// Summary of one topic of a recording of `format`.
-pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic, format: Format) -> TopicSummary {
+/// Summary of one topic.
+pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     let drawn = drawn(topic);
     let of = (&run.plan, &topic.resolved, &topic.prepared);
     let mut summary = TopicSummary {
         topic: topic.name.clone(),
         output_topic: topic.output_topic.clone(),
-        decoded_as: topic.described.clone(),
+        decoded_as: topic.described.to_string(),
         left_out: topic.noticed.left_out().iter().map(|(_, n)| n).sum(),
-        first_losses: first_losses(topic, format),
+        first_losses: first_losses(topic),
         written: topic.output.count,
         rate_hz: topic.output.rate_hz(),
         against: topic
@@ -143,7 +141,7 @@ fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
     Some(Box::new(drawn))
 }
 
-fn first_losses(topic: &Topic, format: Format) -> Vec<String> {
+fn first_losses(topic: &Topic) -> Vec<String> {
     let report = topic.estimator.conditioning();
     let start = report.first.unwrap_or_default();
     let mut said: Vec<String> = Verdict::ALL
@@ -164,8 +162,8 @@ fn first_losses(topic: &Topic, format: Format) -> Vec<String> {
         })
         .collect();
     if let Some((log, why)) = &topic.first_undecodable {
-        // Where others carry a time, lines and rows carry their number.
-        said.push(if format.is_text() {
+        // Payloads of lines and rows carry their number where others carry a time.
+        said.push(if topic.described.text.is_some() {
             format!("first undecodable, line {}: {why}", log.0)
         } else {
             format!("first undecodable, logged at {} ns: {why}", log.0)

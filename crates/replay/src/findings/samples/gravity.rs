@@ -6,6 +6,7 @@ use nalgebra::{Vector3, Vector4};
 use strapd_attitude::condition::quality::GravityAxis;
 use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::setting::{BODY, COLUMNS, GYRO_UNIT, MOUNT};
+use strapd_recording::format::Format;
 
 /// Below this correlation the accelerometer reads too much besides gravity.
 const MIN_CORRELATION: f64 = 0.7;
@@ -164,7 +165,7 @@ fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Findi
         );
     }
     // Of a table the columns say it.
-    match looked.format.is_table() {
+    match looked.described.text.is_some_and(Format::is_table) {
         true => found
             .advise("so gravity cannot correct the attitude: say the unit")
             .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),

@@ -8,7 +8,7 @@ use strapd_attitude::condition::quality::{GravityAxis, Quality};
 use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::estimate::{Meaning, Plan};
 use strapd_attitude::record::{Counts, Declared, Nanos, RawSample, Verdict};
-use strapd_recording::format::Format;
+use strapd_recording::recording::payload_type::PayloadType;
 
 /// Sample number `n` of a 200 Hz stream whose values tell which one it is.
 fn sample(n: i64) -> RawSample {
@@ -31,8 +31,7 @@ fn looked(raw: &[RawSample]) -> Inspection {
     Inspection {
         topic: "/imu".to_owned(),
         of: "/imu".to_owned(),
-        described: "imu [cdr]".to_owned(),
-        format: Format::Mcap,
+        described: PayloadType::of_memory("imu [cdr]"),
         frame: String::new(),
         resolved: Meaning::new(&Plan::default(), &Declared::default()),
         kind_stated: true,
