@@ -29,6 +29,8 @@ mod pages;
 mod parquet;
 #[cfg(feature = "parquet")]
 mod parquet_in;
+#[cfg(target_os = "linux")]
+mod passes;
 mod px4;
 mod recover;
 mod regularise;

@@ -270,8 +270,9 @@ impl Route {
     }
 
     /// The same for a line that holds none; `number` is its number.
-    pub(super) fn lose(&self, number: Nanos, why: Undecodable, out: &mut Vec<Item>) {
+    pub(super) fn lose(&self, number: u64, why: Undecodable, out: &mut Vec<Item>) {
         if let (Some(_), Some(taker)) = (&self.decoder, self.takers.first()) {
+            let number = nanos(number);
             out.push(Item::Undecodable(taker.stream, Box::new((number, why))));
         }
     }

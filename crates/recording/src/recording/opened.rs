@@ -10,6 +10,7 @@ use super::line_input::only_for_tables;
 use super::log_channel::{LogChannel, described, known, nanos, rank};
 use super::made_before::{self, MadeBefore};
 use super::parts::{self, Same, Whole};
+use super::sample_cache;
 use super::sources::{self, Known, Publisher};
 use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
@@ -64,14 +65,19 @@ impl Recording {
     /// # Errors
     /// It cannot be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
-        if !input.parts().is_empty() {
-            return Recording::of_parts(input, options, pool);
+        match input.parts().len() {
+            0 => Recording::of_one(input, options, sample_cache::MOST, pool),
+            _ => Recording::of_parts(input, options, pool),
         }
+    }
+
+    /// Surveys what is in one file, of whose rows at most so many bytes of samples are kept.
+    fn of_one(input: &Input, options: &Options, kept: u64, pool: &Pool) -> Result<Recording> {
         if !input.format().is_text() {
             only_for_tables(input.name(), input.format(), options)?;
             return Recording::of_mcap(input, pool);
         }
-        let (text, channels) = TextLog::survey(input, options)?;
+        let (text, channels) = TextLog::survey(input, options, kept)?;
         Ok(Recording {
             input: input.clone(),
             survey: text.surveyed().clone(),
@@ -84,8 +90,10 @@ impl Recording {
 
     fn of_parts(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
         let mut logs = Vec::new();
+        // All in memory: a file for each were too many of them.
+        let kept = sample_cache::IN_MEMORY / input.parts().len().max(1) as u64;
         for path in input.parts() {
-            let log = Recording::of(&Input::open(path, input.warn())?, options, pool)?;
+            let log = Recording::of_one(&Input::open(path, input.warn())?, options, kept, pool)?;
             logs.push((parts::times(path, &log.survey)?, log));
         }
         logs.sort_by_key(|(times, _)| *times);

@@ -3,14 +3,14 @@
 //! Apart from the log in a text because nothing is read twice: of a stream the first sensor is the one that is meant,
 //! and what is known goes on before the next line is waited for.
 
-use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
-use super::early_besides::{EarlyBesides, are_beside};
-use super::line_input::{are_judged, described, is_sure, no_samples, unclear};
+use super::line_input::{are_judged, described};
+use super::line_reader::{self, Key, LineEvent, LineTaker, Sensors};
+use super::log_channel::nanos;
 use super::payload_type::PayloadType;
 use super::selection::Selection;
 use crate::attitude_line::TRUTH_ID;
-use crate::decode::{Class, Undecodable};
+use crate::decode::{Class, Line};
 use crate::delimited::Table;
 use crate::error::Error;
 use crate::format::Format;
@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::record::{Declared, Nanos};
+use strapd_attitude::record::{Declared, RawSample};
 use strapd_attitude::setting::{COLUMNS, FIELD, RATE_HZ, TIME, TOPIC};
 
 /// Samples that are handed over together.
@@ -57,23 +57,26 @@ impl Sensor {
     }
 }
 
-/// Whoever takes what is read from lines.
-pub trait SensorTaker<E> {
+/// Receiver of the samples of one sensor.
+pub trait SensorTaker {
+    /// Reason to stop reading.
+    type Error: From<Error>;
+
     /// The sensor is known.
     ///
     /// # Errors
     /// It is not taken.
-    fn meet(&mut self, sensor: Sensor) -> Result<(), E>;
+    fn meet(&mut self, sensor: Sensor) -> Result<(), Self::Error>;
     /// The next items, to be taken out of the vector; whether more are wanted.
     ///
     /// # Errors
     /// They cannot be taken.
-    fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>, E>;
+    fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>, Self::Error>;
     /// The next line may be long in coming.
     ///
     /// # Errors
     /// What waits cannot be handed on.
-    fn pause(&mut self) -> Result<(), E>;
+    fn pause(&mut self) -> Result<(), Self::Error>;
 }
 
 /// Reads lines to their end, or until nobody wants them.
@@ -81,149 +84,160 @@ pub trait SensorTaker<E> {
 /// # Errors
 /// They cannot be read; no samples, or without stamps where `clock` wants any; several sensors and none selected; as
 /// `taker`.
-pub fn read<E: From<Error>>(
+pub fn read<T: SensorTaker>(
     (selection, clock): (&Selection, Clock),
     mut lines: Lines<impl Read>,
     path: &Path,
-    taker: &mut impl SensorTaker<E>,
-) -> Result<(), E> {
+    taker: &mut T,
+) -> Result<(), T::Error> {
     let format = lines.format();
-    let mut sensor: Option<String> = None;
-    let mut bare = BareStamps::default();
-    // Rows under a header that is known are of a table, though the first be none.
-    let (mut early, mut first_bad) = (Vec::new(), None);
-    let mut early_besides = EarlyBesides::default();
-    let mut has_rates = false;
     let is_judged = clock == Clock::Header && are_judged(&lines, &selection.decode);
-    let refused = |bare: &BareStamps| match bare.too_fast().filter(|_| is_judged) {
-        Some(found) => Err(Error::unsupported(path, found.in_file(format.is_table()))),
-        None => Ok(()),
+    let mut one = OneSensor {
+        selection,
+        clock,
+        path,
+        taker,
+        is_judged,
+        id: None,
+        has_rates: false,
+        items: Vec::with_capacity(BATCH),
     };
-    let mut samples = Vec::new();
-    let mut items = Vec::with_capacity(BATCH);
-    let mut closed = false;
-    while !closed && let Some(line) = lines.next(&mut samples)? {
-        match line {
-            Err(why) if sensor.is_none() => {
-                first_bad.get_or_insert_with(|| no_samples(path, &lines, &why));
-                if !is_sure(&lines, early.len()) {
-                    break;
-                }
-                early.push(undecodable(lines.number(), why));
+    let sensors = line_reader::read(&mut lines, path, &mut one)?;
+    let Some(bare) = sensors.bare.first() else {
+        return Err(nothing(path, format).into());
+    };
+    if one.is_judged && bare.steps() < STEPS {
+        sensors.check_nanos(path, format)?;
+    }
+    let _ = one.taker.take(&mut one.items)?;
+    Ok(())
+}
+
+/// The one sensor that is taken of a stream.
+struct OneSensor<'r, T> {
+    selection: &'r Selection,
+    clock: Clock,
+    path: &'r Path,
+    taker: &'r mut T,
+    /// Whether stamps that are nanoseconds by their name are held against their steps.
+    is_judged: bool,
+    /// Its id, once it is known.
+    id: Option<String>,
+    has_rates: bool,
+    items: Vec<Item>,
+}
+
+impl<R: Read, T: SensorTaker> LineTaker<R> for OneSensor<'_, T> {
+    type Error = T::Error;
+
+    fn sensor_of(
+        &mut self,
+        line: &mut Line,
+        samples: &[RawSample],
+        lines: &Lines<R>,
+    ) -> Result<Option<Key>, T::Error> {
+        // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
+        let is_sample = line.class == Class::Rate && !samples.is_empty();
+        if !is_sample && samples.iter().all(|s| s.gyro.is_none()) {
+            // Attitudes, status and the like between the samples.
+            self.hold(lines)?;
+            return Ok(None);
+        }
+        let id = line.id.take().unwrap_or_default();
+        let named = self.selection.topic.as_deref();
+        // An attitude carries the rate behind it, which makes it a sample where there is
+        // nothing else: not beside samples, and not when it is the truth about them.
+        let is_truth = id == TRUTH_ID && named != Some(TRUTH_ID);
+        if line.class == Class::Att && (self.has_rates || is_truth) {
+            return Ok(None);
+        }
+        if named.is_some_and(|name| name != "all" && name != id) {
+            return Ok(None);
+        }
+        self.has_rates |= line.class == Class::Rate;
+        match &self.id {
+            Some(first) if *first != id => Err(Error::Topic {
+                path: self.path.to_owned(),
+                topic: first.clone(),
+                what: Diagnostic::new(format!(
+                    "line {}: samples of another sensor, `{id}`",
+                    lines.number()
+                ))
+                .help(format!(
+                    "{TOPIC} ID takes one of them, and of a file {TOPIC} all each"
+                )),
             }
-            Err(why) => items.push(undecodable(lines.number(), why)),
-            // Of another sensor of the device than the gyro.
-            Ok(line) if are_beside(&line, &mut samples) => match &sensor {
-                None if lines.number() > PATIENCE => return Err(nothing(path, format).into()),
-                None => early_besides.hold(line, &mut samples),
-                Some(own) if line.id.as_ref().is_none_or(|id| id == own) => {
-                    let known = bare.take(&mut samples, &line);
-                    let known = known.map_err(|what| unclear(path, &what))?;
-                    items.extend(known.map(|raw| Item::Sample(0, raw)));
-                }
-                Some(_) => samples.clear(),
-            },
-            Ok(mut line) => {
-                // A sample of our own whose rate is null was one with NaN: it is counted, not
-                // passed over.
-                let is_sample = line.class == Class::Rate && !samples.is_empty();
-                let has_rate = samples.iter().any(|s| s.gyro.is_some());
-                if !is_sample && !has_rate {
-                    // Attitudes, status and the like between the samples.
-                    samples.clear();
-                    if sensor.is_none() && lines.number() > PATIENCE {
-                        return Err(nothing(path, format).into());
-                    }
-                    continue;
-                }
-                let id = line.id.take().unwrap_or_default();
-                // An attitude carries the rate behind it, which makes it a sample where there is
-                // nothing else: not beside samples, and not when it is the truth about them.
-                let truth = id == TRUTH_ID && selection.topic.as_deref() != Some(TRUTH_ID);
-                if line.class == Class::Att && (has_rates || truth) {
-                    samples.clear();
-                    continue;
-                }
-                if selection
-                    .topic
-                    .as_deref()
-                    .is_some_and(|t| t != "all" && t != id)
-                {
-                    samples.clear();
-                    continue;
-                }
-                has_rates |= line.class == Class::Rate;
-                match &sensor {
-                    None => {
-                        let declared = Declared {
-                            sample_kind: line.sample_kind,
-                            gyro_unit: line.gyro_unit,
-                            interval_unit_given: selection.decode.states_interval_unit(),
-                            ..lines.declared()
-                        };
-                        let is_placed = matches!(clock, Clock::Index { .. })
-                            || lines.table().is_none_or(Table::has_stamps);
-                        if !is_placed {
-                            return Err(unplaced(path, &lines).into());
-                        }
-                        taker.meet(Sensor::of(&id, &lines, declared))?;
-                        items.append(&mut early);
-                        for (line, mut samples) in early_besides.release(&id) {
-                            let known = bare.take(&mut samples, &line);
-                            let known = known.map_err(|what| unclear(path, &what))?;
-                            items.extend(known.map(|raw| Item::Sample(0, raw)));
-                        }
-                        sensor = Some(id);
-                    }
-                    Some(first) if *first != id => {
-                        return Err(Error::Topic {
-                            path: path.to_owned(),
-                            topic: first.clone(),
-                            what: Diagnostic::new(format!(
-                                "line {}: samples of another sensor, `{id}`",
-                                lines.number()
-                            ))
-                            .help(format!(
-                                "{TOPIC} ID takes one of them, and of a file {TOPIC} all each"
-                            )),
-                        }
-                        .into());
-                    }
-                    Some(_) => {}
-                }
-                let known = bare.take(&mut samples, &line);
-                let known = known.map_err(|what| unclear(path, &what))?;
-                items.extend(known.map(|raw| Item::Sample(0, raw)));
-                if bare.steps() == STEPS {
-                    refused(&bare)?;
-                }
+            .into()),
+            Some(_) => Ok(Some((id, false))),
+            None => {
+                self.meet(&id, line, lines)?;
+                Ok(Some((id, false)))
             }
+        }
+    }
+
+    fn take(&mut self, event: LineEvent<'_>) -> Result<ControlFlow<()>, T::Error> {
+        match event {
+            LineEvent::Met(..) => {}
+            LineEvent::Samples(_, samples) => {
+                let samples = samples.iter().map(|raw| Item::Sample(0, *raw));
+                self.items.extend(samples);
+            }
+            LineEvent::Undecodable(_, number, why) => {
+                let lost = Item::Undecodable(0, Box::new((nanos(number), why)));
+                self.items.push(lost);
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn hold(&mut self, lines: &Lines<R>) -> Result<(), T::Error> {
+        match &self.id {
+            None if lines.number() > PATIENCE => Err(nothing(self.path, lines.format()).into()),
+            _ => Ok(()),
+        }
+    }
+
+    fn line_over(
+        &mut self,
+        lines: &Lines<R>,
+        sensors: &Sensors,
+    ) -> Result<ControlFlow<()>, T::Error> {
+        let Some(bare) = sensors.bare.first() else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        if self.is_judged && bare.steps() == STEPS {
+            sensors.check_nanos(self.path, lines.format())?;
         }
         // With nothing left in the buffer the next line may be long in coming: what is known goes
         // out first.
         let may_wait = lines.may_wait();
-        if sensor.is_some() && (items.len() >= BATCH || may_wait) {
-            closed = taker.take(&mut items)?.is_break();
+        let mut flow = ControlFlow::Continue(());
+        if self.items.len() >= BATCH || may_wait {
+            flow = self.taker.take(&mut self.items)?;
         }
-        if sensor.is_some() && may_wait {
-            taker.pause()?;
+        if may_wait {
+            self.taker.pause()?;
         }
+        Ok(flow)
     }
-    if sensor.is_none() {
-        return Err(first_bad.unwrap_or_else(|| nothing(path, format)).into());
-    }
-    if bare.steps() < STEPS {
-        refused(&bare)?;
-    }
-    let last = bare.settle().map_err(|what| unclear(path, &what))?;
-    items.extend(last.map(|raw| Item::Sample(0, raw)));
-    let _ = taker.take(&mut items)?;
-    Ok(())
 }
 
-fn undecodable(number: u64, why: Undecodable) -> Item {
-    let number = Nanos(i64::try_from(number).unwrap_or(i64::MAX));
-    Item::Undecodable(0, Box::new((number, why)))
+impl<T: SensorTaker> OneSensor<'_, T> {
+    fn meet(&mut self, id: &str, line: &Line, lines: &Lines<impl Read>) -> Result<(), T::Error> {
+        let declared = Declared {
+            sample_kind: line.sample_kind,
+            gyro_unit: line.gyro_unit,
+            interval_unit_given: self.selection.decode.states_interval_unit(),
+            ..lines.declared()
+        };
+        let has_stamps = lines.table().is_none_or(Table::has_stamps);
+        if !has_stamps && !matches!(self.clock, Clock::Index { .. }) {
+            return Err(unplaced(self.path, lines).into());
+        }
+        self.id = Some(id.to_owned());
+        self.taker.meet(Sensor::of(id, lines, declared))
+    }
 }
 
 fn nothing(path: &Path, format: Format) -> Error {

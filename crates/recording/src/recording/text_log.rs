@@ -1,18 +1,17 @@
 //! A file of lines or rows -> the channels of a log, and its samples. I/O.
 //!
 //! Apart from the log because nothing in a text is defined before it comes: which sensors there are, and what their
-//! samples
-//! mean, is known when all of it has been read once. A sensor is a channel, of the name its lines say; attitudes are
-//! another one than samples.
+//! samples mean, is known when all of it has been read, which is once. A sensor is a channel, of the name its lines
+//! say; attitudes are another one than samples.
 
-use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
-use super::early_besides::{EarlyBesides, are_beside};
 use super::input::{Bytes, Input};
-use super::line_input::{are_judged, described, is_sure, no_samples, unclear};
+use super::line_input::{are_judged, described};
+use super::line_reader::{Key, LineEvent, LineTaker, MOST_SENSORS, read};
 use super::log_channel::LogChannel;
+use super::sample_cache::{CacheWriter, SampleCache};
 use crate::attitude_line::TRUTH_ID;
-use crate::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
+use crate::decode::{Class, Line, Options, Rank, Role, Stated};
 use crate::delimited::Table;
 use crate::error::{Error, Result};
 use crate::format::Format;
@@ -20,12 +19,9 @@ use crate::lines::Lines;
 use crate::mcap::{Channel, ChannelSurvey, Schema, Survey};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::record::{Declared, Nanos, RawSample};
+use strapd_attitude::record::{Declared, RawSample};
 
-/// Sensors that are told apart. More are no sensors.
-const MOST_SENSORS: usize = 1024;
 /// Items that go through the pipeline together.
 const BATCH: usize = 1024;
 /// Name of samples that name no sensor.
@@ -38,10 +34,9 @@ pub(super) struct TextLog {
     options: Options,
     channels: Vec<Arc<Channel>>,
     survey: Survey,
+    /// Its samples, where they are few enough to be kept.
+    cache: Option<SampleCache>,
 }
-
-/// A sensor, and whether these are attitudes.
-type Key = (String, bool);
 
 /// Channel as far as it was met.
 struct Met {
@@ -51,43 +46,42 @@ struct Met {
     times: Option<(u64, u64)>,
 }
 
-/// The sensors met so far, each with its samples whose stamps are not known yet.
-#[derive(Default)]
-struct Sensors {
-    places: BTreeMap<Key, usize>,
-    bare: Vec<BareStamps>,
-    /// Lines of those that are too many.
-    left_out: u64,
-}
+/// Receiver of what a text holds, of all its sensors.
+struct AllSensors<T>(T);
 
-impl Sensors {
-    /// Refuses stamps whose name says nanoseconds and whose steps say another unit.
-    fn check_nanos(&self, lines: &Lines<Bytes>, options: &Options, path: &Path) -> Result<()> {
-        if !are_judged(lines, options) {
-            return Ok(());
+impl<E: From<Error>, T> LineTaker<Bytes> for AllSensors<T>
+where
+    T: FnMut(LineEvent<'_>) -> std::result::Result<ControlFlow<()>, E>,
+{
+    type Error = E;
+
+    /// Returns the sensor of a line, whose attitudes are another one; `None` of status and the like between samples.
+    fn sensor_of(
+        &mut self,
+        line: &mut Line,
+        samples: &[RawSample],
+        _: &Lines<Bytes>,
+    ) -> std::result::Result<Option<Key>, E> {
+        let says_something = |s: &RawSample| s.gyro.is_some() || s.orientation.is_some();
+        if line.class != Class::Rate && !samples.iter().any(says_something) {
+            return Ok(None);
         }
-        match self.bare.iter().find_map(BareStamps::too_fast) {
-            Some(found) => Err(Error::unsupported(
-                path,
-                found.in_file(lines.format().is_table()),
-            )),
-            None => Ok(()),
-        }
+        let is_attitude = line.class == Class::Att;
+        Ok(Some((line.id.take().unwrap_or_default(), is_attitude)))
+    }
+
+    fn take(&mut self, event: LineEvent<'_>) -> std::result::Result<ControlFlow<()>, E> {
+        (self.0)(event)
     }
 }
 
-/// The next of a text.
-enum Read<'l> {
-    /// Line and its samples, of the channel of this place; more may still wait for their stamps.
-    Samples(usize, &'l Key, &'l Line, &'l [RawSample]),
-    /// A line that is none, of the channel before it, and its number.
-    Undecodable(usize, u64, Undecodable),
-}
-
 impl TextLog {
-    /// Reads all of it, for what is in it.
-    pub(super) fn survey(input: &Input, options: &Options) -> Result<(TextLog, Vec<LogChannel>)> {
-        let mut met: Vec<(Key, Met)> = Vec::new();
+    /// Reads all of it, for what is in it; its samples are kept if these are at most so many bytes.
+    pub(super) fn survey(
+        input: &Input,
+        options: &Options,
+        kept: u64,
+    ) -> Result<(TextLog, Vec<LogChannel>)> {
         let mut lines = input.lines(options)?;
         let declared = lines.declared();
         let table = lines.table().cloned();
@@ -101,21 +95,27 @@ impl TextLog {
                 .warn()
                 .say(&format!("{}: {note}", input.name().display()));
         }
-        let sensors = read::<Error>(&mut lines, input.name(), |read| {
-            if let Read::Samples(place, key, line, samples) = read {
-                if place == met.len() {
-                    met.push((
-                        key.clone(),
-                        Met::new(line, options, &declared, &description),
-                    ));
+        let (mut met, mut cache) = (Vec::<(Key, Met)>::new(), CacheWriter::new(kept));
+        let mut all = AllSensors(|event: LineEvent<'_>| -> Result<_> {
+            match &event {
+                LineEvent::Met(key, line) => {
+                    let first = Met::new(line, options, &declared, &description);
+                    met.push(((*key).clone(), first));
                 }
-                if let Some((_, met)) = met.get_mut(place) {
-                    met.take(samples);
+                LineEvent::Samples(place, samples) => {
+                    if let Some((_, met)) = met.get_mut(*place) {
+                        met.take(samples);
+                    }
                 }
+                LineEvent::Undecodable(..) => {}
             }
+            cache.push(event);
             Ok(ControlFlow::Continue(()))
-        })?;
-        sensors.check_nanos(&lines, options, input.name())?;
+        });
+        let sensors = read(&mut lines, input.name(), &mut all)?;
+        if are_judged(&lines, options) {
+            sensors.check_nanos(input.name(), lines.format())?;
+        }
         if met.is_empty() {
             return Err(Error::Unsupported {
                 path: input.name().to_owned(),
@@ -154,6 +154,7 @@ impl TextLog {
             options: options.clone(),
             channels: channels.iter().map(|known| known.channel.clone()).collect(),
             survey,
+            cache: cache.finish(),
         };
         Ok((log, channels))
     }
@@ -163,7 +164,7 @@ impl TextLog {
         &self.survey
     }
 
-    /// Reads all of it once more: the items of the channels that have a way, in the order of the lines.
+    /// Gives the items of the channels that have a way, in the order of the lines: as they were kept, or read once more.
     pub(super) fn walk<E: From<Error>>(
         &self,
         mut select: impl FnMut(&Arc<Channel>) -> Option<Route>,
@@ -171,18 +172,18 @@ impl TextLog {
     ) -> std::result::Result<(), E> {
         let routes: Vec<Option<Route>> = self.channels.iter().map(&mut select).collect();
         let mut items = Vec::with_capacity(BATCH);
-        let mut lines = self.input.lines(&self.options)?;
         let mut is_over = false;
-        read::<E>(&mut lines, self.input.name(), |read| {
-            match read {
-                Read::Samples(place, _, _, samples) => {
-                    if let Some(Some(route)) = routes.get(place) {
+        let mut each = |event: LineEvent<'_>| -> std::result::Result<_, E> {
+            let route = |place: usize| routes.get(place).and_then(Option::as_ref);
+            match event {
+                LineEvent::Met(..) => {}
+                LineEvent::Samples(place, samples) => {
+                    if let Some(route) = route(place) {
                         route.pass(samples, &mut items);
                     }
                 }
-                Read::Undecodable(place, number, why) => {
-                    if let Some(Some(route)) = routes.get(place) {
-                        let number = Nanos(i64::try_from(number).unwrap_or(i64::MAX));
+                LineEvent::Undecodable(place, number, why) => {
+                    if let Some(route) = route(place) {
                         route.lose(number, why, &mut items);
                     }
                 }
@@ -194,133 +195,20 @@ impl TextLog {
             items.clear();
             is_over = flow.is_break();
             Ok(flow)
-        })?;
+        };
+        let kept = self.cache.as_ref().and_then(|cache| cache.walk(&mut each));
+        match kept {
+            Some(walked) => walked?,
+            None => {
+                let mut lines = self.input.lines(&self.options)?;
+                read(&mut lines, self.input.name(), &mut AllSensors(each))?;
+            }
+        }
         if !is_over && !items.is_empty() {
             let _ = take(&mut items)?;
         }
         Ok(())
     }
-}
-
-/// Reads a text to its end, or until `take` has enough.
-fn read<E: From<Error>>(
-    lines: &mut Lines<Bytes>,
-    path: &Path,
-    mut take: impl FnMut(Read<'_>) -> std::result::Result<ControlFlow<()>, E>,
-) -> std::result::Result<Sensors, E> {
-    let mut sensors = Sensors::default();
-    let mut samples = Vec::new();
-    let mut before = None;
-    // Rows under a header that is known are of a table, though the first be none.
-    let (mut early, mut first_bad) = (Vec::new(), None);
-    let mut early_besides = EarlyBesides::default();
-    while let Some(line) = lines.next(&mut samples)? {
-        let line = match (line, before) {
-            (Ok(line), _) => line,
-            (Err(why), None) => {
-                first_bad.get_or_insert_with(|| no_samples(path, lines, &why));
-                if !is_sure(lines, early.len()) {
-                    break;
-                }
-                early.push((lines.number(), why));
-                continue;
-            }
-            (Err(why), Some(place)) => {
-                if take(Read::Undecodable(place, lines.number(), why))?.is_break() {
-                    return Ok(sensors);
-                }
-                continue;
-            }
-        };
-        if are_beside(&line, &mut samples) {
-            let place = match &line.id {
-                Some(id) => sensors.places.get(&(id.clone(), false)).copied(),
-                None => before,
-            };
-            let Some(bare) = place.and_then(|place| sensors.bare.get_mut(place)) else {
-                early_besides.hold(line, &mut samples);
-                continue;
-            };
-            let known: Vec<RawSample> = bare
-                .take(&mut samples, &line)
-                .map_err(|what| unclear(path, &what))?
-                .collect();
-            let id = line.id.clone().unwrap_or_default();
-            let of = Read::Samples(place.unwrap_or_default(), &(id, false), &line, &known);
-            if !known.is_empty() && take(of)?.is_break() {
-                return Ok(sensors);
-            }
-            continue;
-        }
-        let says_something = |s: &RawSample| s.gyro.is_some() || s.orientation.is_some();
-        if line.class != Class::Rate && !samples.iter().any(says_something) {
-            // Status and the like between the samples.
-            samples.clear();
-            continue;
-        }
-        let key = (
-            line.id.clone().unwrap_or_default(),
-            line.class == Class::Att,
-        );
-        let next = sensors.places.len();
-        let mut of_before = Vec::new();
-        let place = match sensors.places.get(&key) {
-            Some(place) => *place,
-            None if next >= MOST_SENSORS => {
-                sensors.left_out += 1;
-                samples.clear();
-                continue;
-            }
-            None => {
-                sensors.places.insert(key.clone(), next);
-                sensors.bare.push(BareStamps::default());
-                of_before = early_besides.release(&key.0);
-                next
-            }
-        };
-        before = Some(place);
-        for (number, why) in early.drain(..) {
-            if take(Read::Undecodable(place, number, why))?.is_break() {
-                return Ok(sensors);
-            }
-        }
-        let Some(bare) = sensors.bare.get_mut(place) else {
-            continue;
-        };
-        let mut known: Vec<RawSample> = Vec::new();
-        for (line, samples) in of_before
-            .iter_mut()
-            .map(|(line, samples)| (&*line, samples))
-        {
-            let first = bare.take(samples, line);
-            known.extend(first.map_err(|what| unclear(path, &what))?);
-        }
-        known.extend(
-            bare.take(&mut samples, &line)
-                .map_err(|what| unclear(path, &what))?,
-        );
-        if take(Read::Samples(place, &key, &line, &known))?.is_break() {
-            return Ok(sensors);
-        }
-    }
-    if let Some(why) = first_bad.filter(|_| before.is_none()) {
-        return Err(why.into());
-    }
-    let places: Vec<(Key, usize)> = std::mem::take(&mut sensors.places).into_iter().collect();
-    for (key, place) in places {
-        let Some(bare) = sensors.bare.get_mut(place) else {
-            continue;
-        };
-        let last: Vec<RawSample> = bare
-            .settle()
-            .map_err(|what| unclear(path, &what))?
-            .collect();
-        if !last.is_empty() && take(Read::Samples(place, &key, &Line::default(), &last))?.is_break()
-        {
-            break;
-        }
-    }
-    Ok(sensors)
 }
 
 impl Met {

@@ -80,7 +80,9 @@ struct Running<'r, 'w> {
     watch: &'w mut dyn FnMut(&Position),
 }
 
-impl SensorTaker<Error> for Running<'_, '_> {
+impl SensorTaker for Running<'_, '_> {
+    type Error = Error;
+
     fn meet(&mut self, sensor: Sensor) -> Result<()> {
         let (mut found, stream) = met(self.run, sensor);
         if self.run.selection.topic.is_none()
@@ -112,7 +114,9 @@ struct Looking<'r> {
     preparation: Option<(String, Preparation)>,
 }
 
-impl SensorTaker<Error> for Looking<'_> {
+impl SensorTaker for Looking<'_> {
+    type Error = Error;
+
     fn meet(&mut self, sensor: Sensor) -> Result<()> {
         let (found, _) = met(self.run, sensor);
         let preparation = preparation(self.run, &found, Patience::WholeLog);

@@ -1,0 +1,210 @@
+//! Lines or rows -> the samples of their sensors, each with its stamp. I/O through the lines.
+//!
+//! Apart from those who take them because a text that is read as often as is needed, and one that comes once, begin
+//! alike: with lines that are none, with forces that come before their gyro, with stamps whose unit is not known yet.
+
+use super::bare_stamps::BareStamps;
+use super::early_besides::{EarlyBesides, are_beside};
+use super::line_input::{is_sure, no_samples, unclear};
+use crate::decode::{Line, Undecodable};
+use crate::error::Error;
+use crate::format::Format;
+use crate::lines::Lines;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::ops::ControlFlow;
+use std::path::Path;
+use strapd_attitude::record::RawSample;
+
+/// Sensors that are told apart. More are no sensors.
+pub(super) const MOST_SENSORS: usize = 1024;
+
+/// Name of a sensor, and whether these are its attitudes.
+pub(super) type Key = (String, bool);
+
+/// Content of a line, of the sensor of this place in the order of appearance.
+#[derive(Debug)]
+pub(super) enum LineEvent<'s> {
+    /// A sensor that is new, and its first line.
+    Met(&'s Key, &'s Line),
+    /// Samples whose stamps are known by now; more may still wait.
+    Samples(usize, &'s [RawSample]),
+    /// Number of a line that holds none, behind one of this sensor.
+    Undecodable(usize, u64, Undecodable),
+}
+
+/// Receiver of what lines hold.
+pub(super) trait LineTaker<R> {
+    /// Reason to stop reading.
+    type Error: From<Error>;
+
+    /// Returns the sensor whose samples a line holds; `None` passes the line over.
+    fn sensor_of(
+        &mut self,
+        line: &mut Line,
+        samples: &[RawSample],
+        lines: &Lines<R>,
+    ) -> Result<Option<Key>, Self::Error>;
+
+    /// Takes what comes next; whether more is wanted.
+    fn take(&mut self, event: LineEvent<'_>) -> Result<ControlFlow<()>, Self::Error>;
+
+    /// Notes a line with nothing but forces or fields, of a sensor that is still to come.
+    fn hold(&mut self, _: &Lines<R>) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// Notes the end of a line; whether more are wanted.
+    fn line_over(&mut self, _: &Lines<R>, _: &Sensors) -> Result<ControlFlow<()>, Self::Error> {
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
+/// The sensors met so far, each with its samples whose stamps are not known yet.
+#[derive(Default)]
+pub(super) struct Sensors {
+    places: BTreeMap<Key, usize>,
+    pub(super) bare: Vec<BareStamps>,
+    /// Lines of those that are too many.
+    pub(super) left_out: u64,
+}
+
+impl Sensors {
+    /// Returns the place of a sensor, behind all others if it is new; `None` where there are too many.
+    fn place_of(&mut self, key: &Key) -> Option<usize> {
+        let next = self.places.len();
+        if let Some(place) = self.places.get(key) {
+            return Some(*place);
+        }
+        let is_one_more = next >= MOST_SENSORS;
+        self.left_out += u64::from(is_one_more);
+        (!is_one_more).then_some(next)
+    }
+
+    /// Refuses stamps whose name says nanoseconds and whose steps say another unit.
+    pub(super) fn check_nanos(&self, path: &Path, format: Format) -> Result<(), Error> {
+        match self.bare.iter().find_map(BareStamps::too_fast) {
+            Some(found) => Err(Error::unsupported(path, found.in_file(format.is_table()))),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the stamps of the sensor of this place that a line belongs to beside its samples.
+    fn owner(&mut self, line: &Line, before: Option<usize>) -> Option<(usize, &mut BareStamps)> {
+        let place = match &line.id {
+            Some(id) => *self.places.get(&(id.clone(), false))?,
+            None => before?,
+        };
+        Some((place, self.bare.get_mut(place)?))
+    }
+}
+
+/// Reads a text to its end, or until `taker` has enough.
+///
+/// # Errors
+/// It cannot be read, or begins with no line of samples; the unit of stamps is not clear; as `taker`.
+pub(super) fn read<R: Read, T: LineTaker<R>>(
+    lines: &mut Lines<R>,
+    path: &Path,
+    taker: &mut T,
+) -> Result<Sensors, T::Error> {
+    let mut sensors = Sensors::default();
+    let (mut samples, mut known) = (Vec::new(), Vec::new());
+    let mut before = None;
+    // Rows under a header that is known are of a table, though the first be none.
+    let (mut early, mut first_bad) = (Vec::new(), None);
+    let mut early_besides = EarlyBesides::default();
+    while let Some(line) = lines.next(&mut samples)? {
+        known.clear();
+        let of_line = match (line, before) {
+            (Err(why), None) => {
+                first_bad.get_or_insert_with(|| no_samples(path, lines, &why));
+                if !is_sure(lines, early.len()) {
+                    break;
+                }
+                early.push((lines.number(), why));
+                None
+            }
+            (Err(why), Some(place)) => Some(LineEvent::Undecodable(place, lines.number(), why)),
+            // Of another sensor of the device than the gyro.
+            (Ok(line), _) if are_beside(&line, &mut samples) => {
+                match sensors.owner(&line, before) {
+                    Some((place, bare)) => {
+                        stamped(bare, &mut samples, &line, path, &mut known)?;
+                        (!known.is_empty()).then_some(LineEvent::Samples(place, &known))
+                    }
+                    None => {
+                        early_besides.hold(line, &mut samples);
+                        taker.hold(lines)?;
+                        None
+                    }
+                }
+            }
+            (Ok(mut line), _) => {
+                let key = taker.sensor_of(&mut line, &samples, lines)?;
+                let place = key.as_ref().and_then(|key| sensors.place_of(key));
+                if let Some((key, place)) = key.zip(place) {
+                    if place == sensors.bare.len() {
+                        if taker.take(LineEvent::Met(&key, &line))?.is_break() {
+                            return Ok(sensors);
+                        }
+                        let mut bare = BareStamps::default();
+                        for (line, mut samples) in early_besides.release(&key.0) {
+                            stamped(&mut bare, &mut samples, &line, path, &mut known)?;
+                        }
+                        sensors.bare.push(bare);
+                        sensors.places.insert(key, place);
+                    }
+                    before = Some(place);
+                    for (number, why) in early.drain(..) {
+                        let lost = LineEvent::Undecodable(place, number, why);
+                        if taker.take(lost)?.is_break() {
+                            return Ok(sensors);
+                        }
+                    }
+                    if let Some(bare) = sensors.bare.get_mut(place) {
+                        stamped(bare, &mut samples, &line, path, &mut known)?;
+                    }
+                }
+                // Those of a line that was passed over.
+                samples.clear();
+                place.map(|place| LineEvent::Samples(place, &known))
+            }
+        };
+        if let Some(event) = of_line
+            && taker.take(event)?.is_break()
+        {
+            return Ok(sensors);
+        }
+        if taker.line_over(lines, &sensors)?.is_break() {
+            return Ok(sensors);
+        }
+    }
+    if let Some(why) = first_bad.filter(|_| before.is_none()) {
+        return Err(why.into());
+    }
+    for place in sensors.places.values() {
+        let Some(bare) = sensors.bare.get_mut(*place) else {
+            continue;
+        };
+        let last = bare.settle().map_err(|what| unclear(path, &what))?;
+        let last: Vec<RawSample> = last.collect();
+        if !last.is_empty() && taker.take(LineEvent::Samples(*place, &last))?.is_break() {
+            break;
+        }
+    }
+    Ok(sensors)
+}
+
+/// Appends the samples whose stamps are known with those of a line.
+fn stamped(
+    bare: &mut BareStamps,
+    samples: &mut Vec<RawSample>,
+    line: &Line,
+    path: &Path,
+    known: &mut Vec<RawSample>,
+) -> Result<(), Error> {
+    let released = bare.take(samples, line);
+    known.extend(released.map_err(|what| unclear(path, &what))?);
+    Ok(())
+}
