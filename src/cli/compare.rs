@@ -132,14 +132,9 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let told = Told::of(&estimate, (&estimated, referred), align);
     if let Some(document) = plot {
         let chart = chart(&estimated, referred, align, errors);
-        document.write(
-            &chart
-                .svg()
-                .map_err(|e| strapd_recording::Error::Unsupported {
-                    path: PathBuf::from(&estimate.name),
-                    what: e.to_string().into(),
-                })?,
-        )?;
+        document.write(&chart.svg().map_err(|e| {
+            strapd_recording::Error::unsupported(Path::new(&estimate.name), e.to_string())
+        })?)?;
     }
     let exceeded = args
         .max_angle
@@ -287,16 +282,13 @@ fn no_match(estimate: &attitude_track::Track, reference: &attitude_track::Track)
         }
         _ => format!("{}: no attitudes", t.name),
     };
-    strapd_recording::Error::Unsupported {
-        path: PathBuf::from(&estimate.name),
-        what: Diagnostic::new(format!(
-            "no instant in common with the reference\n  {}\n  {}",
-            span(estimate),
-            span(reference)
-        ))
-        .help("are both on the same clock (replay --time)?"),
-    }
-    .into()
+    let what = Diagnostic::new(format!(
+        "no instant in common with the reference\n  {}\n  {}",
+        span(estimate),
+        span(reference)
+    ))
+    .help("are both on the same clock (replay --time)?");
+    strapd_recording::Error::unsupported(Path::new(&estimate.name), what).into()
 }
 
 fn as_text(result: &Comparison, align: Align, estimate: &str, reference: &str) -> String {

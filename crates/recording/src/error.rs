@@ -142,7 +142,8 @@ impl Error {
     }
 
     /// Error for what cannot be read of this file.
-    pub(crate) fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> Error {
+    #[must_use]
+    pub fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> Error {
         Error::Unsupported {
             path: path.to_owned(),
             what: what.into(),

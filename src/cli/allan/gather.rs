@@ -82,23 +82,8 @@ pub(super) fn gather(
     let mut decoders = Decoders::of_run(plan, &selection.decode);
     let reading = TopicReading::new(&log, selection.topic.as_deref(), &mut decoders)?;
     let topic = reading.name().to_owned();
-    let unsupported = |what: Diagnostic| {
-        strapd_recording::Error::Unsupported {
-            path: log.name().to_owned(),
-            what,
-        }
-        .into()
-    };
-    let Some((known, decoder)) = reading.channels.first() else {
-        return Err(unsupported(format!("{topic}: no channel of it").into()));
-    };
+    let (known, decoder) = reading.plan().first_with_rate(log.name())?;
     let described = described(&known.channel).to_string();
-    if !decoder.stated().has_gyro {
-        return Err(unsupported(
-            Diagnostic::new(format!("{topic} ({described}): carries no body rate"))
-                .help("--field gyro=PATH names one"),
-        ));
-    }
     let mut gathering = Gathering::new(
         plan,
         Meaning::new(plan, &decoder.stated().declared),

@@ -153,6 +153,12 @@ impl Plan {
         result
     }
 
+    /// Returns the covariance of the orientation in an Imu, as in [`super::Decoder::orientation_covariance`].
+    pub(crate) fn orientation_covariance(&self, payload: &[u8]) -> Option<[f64; 9]> {
+        self.imu
+            .then(|| imu::orientation_covariance(payload, self.cdr))?
+    }
+
     /// The same plan, on the short way where its layout has one.
     pub(crate) fn recognised(self) -> Self {
         let imu = imu::is_imu(&self);

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
 
 /// Uses of a channel's messages.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Route {
     /// Reads the samples in them; `None` when there are none.
     pub decoder: Option<Decoder>,
@@ -21,6 +21,8 @@ pub struct Route {
     turn: Option<usize>,
     /// Reads the recorded orientations in them to compare with.
     pub reference: Option<Decoder>,
+    /// Whether the covariances of these are read too.
+    with_covariances: bool,
     /// Reads the specific forces, or magnetic fields, in them that belong to the samples of others.
     pub beside: Option<Decoder>,
     /// The channel, when its messages are copied to the output.
@@ -108,8 +110,8 @@ pub enum Item {
     Sample(usize, RawSample),
     /// A payload of a stream that could not be decoded.
     Undecodable(usize, Box<(Nanos, Undecodable)>),
-    /// A recorded orientation to compare with.
-    Reference(RawSample),
+    /// A recorded orientation to compare with, and its covariance ([`Decoder::orientation_covariance`]) if it is read.
+    Reference(RawSample, Option<Box<[f64; 9]>>),
     /// A specific force, or a magnetic field, of a message that is no sample.
     Beside(RawSample),
     /// A message to be copied.
@@ -159,40 +161,35 @@ impl Route {
         Route {
             decoder: Some(decoder),
             takers,
-            turn: None,
-            reference: None,
-            beside: None,
-            copied: None,
+            ..Route::default()
         }
     }
 
     /// Messages that are recorded orientations.
     #[must_use]
     pub fn reference(decoder: Decoder) -> Route {
-        Route {
-            decoder: None,
-            reference: Some(decoder.clone()),
-            ..Route::samples(decoder, 0)
-        }
+        Route::default().comparing(Some(decoder))
     }
 
     /// Messages that are only copied.
     #[must_use]
     pub fn only_copied(channel: Arc<Channel>) -> Route {
-        Route {
-            decoder: None,
-            takers: Vec::new(),
-            turn: None,
-            reference: None,
-            beside: None,
-            copied: Some(channel),
-        }
+        Route::default().copying(Some(channel))
     }
 
     /// The same, what the messages hold also compared with where a decoder is given.
     #[must_use]
     pub fn comparing(self, reference: Option<Decoder>) -> Route {
         Route { reference, ..self }
+    }
+
+    /// The same, the covariances of what is compared with read too.
+    #[must_use]
+    pub fn with_covariances(self) -> Route {
+        Route {
+            with_covariances: true,
+            ..self
+        }
     }
 
     /// The same, what the messages hold also taken beside the samples where a decoder is given.
@@ -204,14 +201,8 @@ impl Route {
     /// Messages that are neither samples nor compared with.
     #[must_use]
     pub fn other(beside: Option<Decoder>, copied: Option<Arc<Channel>>) -> Option<Route> {
-        (beside.is_some() || copied.is_some()).then_some(Route {
-            decoder: None,
-            takers: Vec::new(),
-            turn: None,
-            reference: None,
-            beside,
-            copied,
-        })
+        let is_any = beside.is_some() || copied.is_some();
+        is_any.then(|| Route::default().beside(beside).copying(copied))
     }
 
     /// The same, the messages also copied where a channel is given.
@@ -242,7 +233,12 @@ impl Route {
             self.decode(decoder, message, out);
         }
         if let Some(decoder) = &self.reference {
-            recorded(decoder, message, Item::Reference, out);
+            let covariance = match self.with_covariances {
+                true => decoder.orientation_covariance(message.data),
+                false => None,
+            };
+            let item = |raw| Item::Reference(raw, covariance.map(Box::new));
+            recorded(decoder, message, item, out);
         }
         if let Some(channel) = &self.copied {
             out.push(Item::Copy(Box::new(Copied {
@@ -265,7 +261,7 @@ impl Route {
         }
         if self.reference.is_some() {
             let own = samples.iter().filter(|raw| !raw.is_beside);
-            out.extend(own.map(|raw| Item::Reference(*raw)));
+            out.extend(own.map(|raw| Item::Reference(*raw, None)));
         }
     }
 
@@ -333,7 +329,7 @@ impl Route {
 fn recorded(
     decoder: &Decoder,
     message: &Message<'_>,
-    item: fn(RawSample) -> Item,
+    item: impl Fn(RawSample) -> Item,
     out: &mut Vec<Item>,
 ) {
     let (log, publish) = (nanos(message.log_time), nanos(message.publish_time));

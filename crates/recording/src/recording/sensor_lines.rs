@@ -121,7 +121,7 @@ struct OneSensor<'r, T> {
     taker: &'r mut T,
     /// Whether stamps that are nanoseconds by their name are held against their steps.
     is_judged: bool,
-    /// Its id, once it is known.
+    /// Id of the sensor, once it is known.
     id: Option<String>,
     has_rates: bool,
     items: Vec<Item>,

@@ -34,7 +34,7 @@ pub(super) struct TextLog {
     options: Options,
     channels: Vec<Arc<Channel>>,
     survey: Survey,
-    /// Its samples, where they are few enough to be kept.
+    /// Samples, if they are few enough to be kept.
     cache: Option<SampleCache>,
 }
 

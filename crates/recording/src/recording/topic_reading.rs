@@ -8,30 +8,24 @@ use super::decoders::Decoders;
 use super::log_channel::LogChannel;
 use super::opened::{AHEAD, Recording, problems};
 use super::selection::Selection;
-use super::sources::Publisher;
-use super::topics;
+use super::topic_plan::{self, TopicPlan};
 use crate::decode::{Decoder, Undecodable};
 use crate::error::{Error, Result};
-use crate::mcap::{Channel, Survey};
+use crate::mcap::Survey;
 use crate::pool::Pool;
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Meaning, Plan};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 
-/// A topic, and how it is read.
+/// A topic that is read by itself.
 #[derive(Debug)]
 pub struct TopicReading<'l> {
     log: &'l Recording,
-    source: Publisher,
+    plan: TopicPlan<'l>,
     /// Something to know about the choice.
     pub note: Option<String>,
-    /// Channels, at least one, with their decoders.
-    pub channels: Vec<(&'l LogChannel, Decoder)>,
-    /// Index among the channels, by id and schema id.
-    places: BTreeMap<(u16, u16), usize>,
     /// Topics that belong to these samples.
     besides: Besides,
 }
@@ -72,39 +66,30 @@ impl<'l> TopicReading<'l> {
         topic: &str,
         decoders: &mut Decoders,
     ) -> Result<TopicReading<'l>> {
-        let source = log.source(topic).ok_or_else(|| Error::NoSuchTopic {
-            path: log.name().to_owned(),
-            topic: topic.to_owned(),
-            topics: topics::listing(&log.candidates()),
-        })?;
-        let mut channels = Vec::new();
-        let mut places = BTreeMap::new();
-        for known in log.channels_of(&source) {
-            let decoder = known.decoder(decoders).map_err(|why| Error::Unsupported {
-                path: log.name().to_owned(),
-                what: Diagnostic::from(&why),
-            })?;
-            places
-                .entry((known.channel.id, known.channel.schema_id))
-                .or_insert(channels.len());
-            channels.push((known, decoder));
+        let plan = TopicPlan::named(log, topic, decoders)?;
+        if let Some(why) = plan.refusals.first() {
+            return Err(Error::unsupported(log.name(), Diagnostic::from(why)));
         }
         Ok(TopicReading {
             log,
-            source,
+            plan,
             note: None,
-            channels,
-            places,
             besides: Besides::default(),
         })
+    }
+
+    /// Returns the plan by which it is read.
+    #[must_use]
+    pub fn plan(&self) -> &TopicPlan<'l> {
+        &self.plan
     }
 
     /// The same with the magnetic fields that a topic of their own has for these samples, where there is one.
     #[must_use]
     pub fn with_fields(mut self) -> TopicReading<'l> {
         let has_field = |(_, decoder): &(&LogChannel, Decoder)| decoder.stated().has_mag;
-        if !self.channels.iter().any(has_field) {
-            let found = beside::of_fields(&Plan::default(), self.log, &self.source.topic);
+        if !self.plan.channels.iter().any(has_field) {
+            let found = beside::of_fields(&Plan::default(), self.log, &self.plan.source.topic);
             self.besides = found.unwrap_or_default();
         }
         self
@@ -118,23 +103,17 @@ impl<'l> TopicReading<'l> {
         if selection.mag.is_none() {
             self = self.with_fields();
         }
-        let own = (self.source.topic.as_str(), true);
+        let own = (self.plan.source.topic.as_str(), true);
         let asked = (&Plan::default(), selection);
         let named = beside::choose(asked, self.log.name(), self.log, own)?;
         self.besides.append(named);
         Ok(self)
     }
 
-    /// The place of a channel met in a walk among its own.
-    fn place_of(&self, met: &Channel) -> Option<usize> {
-        let place = self.places.get(&(met.id, met.schema_id));
-        place.filter(|_| met.topic == self.source.topic).copied()
-    }
-
     /// Name that `--topic` takes.
     #[must_use]
     pub fn name(&self) -> &str {
-        &self.source.name
+        &self.plan.source.name
     }
 
     /// Reads all of it, in order, until `take` has enough or fails: samples in rad/s, m/s^2 and FLU, each with what the
@@ -183,7 +162,7 @@ pub(super) fn walk_in_flu<E: From<Error>>(
     };
     let meanings: Vec<Vec<(Meaning, Option<SampleKind>)>> = readings
         .iter()
-        .map(|reading| reading.channels.iter().map(of_channel).collect())
+        .map(|reading| reading.plan.channels.iter().map(of_channel).collect())
         .collect();
     let warn = log.input().warn();
     let mut undecodable = 0u64;
@@ -225,36 +204,29 @@ fn walk<E: From<Error>>(
     let streams: Vec<(usize, usize)> = readings
         .iter()
         .enumerate()
-        .flat_map(|(at, reading)| (0..reading.channels.len()).map(move |place| (at, place)))
+        .flat_map(|(at, reading)| (0..reading.plan.channels.len()).map(move |place| (at, place)))
+        .collect();
+    let begins: Vec<usize> = (0..readings.len())
+        .map(|at| streams.partition_point(|(of, _)| *of < at))
         .collect();
     let noticed: Vec<Arc<Noticed>> = readings
         .iter()
-        .map(|reading| Arc::new(Noticed::of(&reading.source)))
+        .map(|reading| Arc::new(Noticed::of(&reading.plan.source)))
         .collect();
     log.walk(
         AHEAD,
         pool,
         |met| {
-            let mut decoder = None;
-            let mut takers = Vec::new();
-            for (stream, (at, place)) in streams.iter().enumerate() {
-                if let (Some(reading), Some(noticed)) = (readings.get(*at), noticed.get(*at))
-                    && reading.place_of(met) == Some(*place)
-                    && let Some((_, own)) = reading.channels.get(*place)
-                {
-                    decoder.get_or_insert(own);
-                    let noticed = noticed.clone();
-                    takers.push(Taker { stream, noticed });
-                }
-            }
-            match decoder {
-                Some(decoder) => Some(Route::to(decoder.clone(), takers)),
-                None => {
-                    let mut besides = readings.iter().map(|reading| &reading.besides);
-                    let decoder = besides.find_map(|besides| besides.decoder(met));
-                    Route::other(decoder.cloned(), None)
-                }
-            }
+            let plans = readings.iter().map(|reading| &reading.plan);
+            let samples = topic_plan::route(plans, met, |at, place| Taker {
+                stream: begins.get(at).map_or(0, |begin| begin + place),
+                noticed: noticed.get(at).cloned().unwrap_or_default(),
+            });
+            samples.or_else(|| {
+                let mut besides = readings.iter().map(|reading| &reading.besides);
+                let decoder = besides.find_map(|besides| besides.decoder(met));
+                Route::other(decoder.cloned(), None)
+            })
         },
         |items| {
             for item in items.drain(..) {
@@ -266,7 +238,7 @@ fn walk<E: From<Error>>(
                         let is_beside = true;
                         (0, Ok(RawSample { is_beside, ..raw }))
                     }
-                    Item::Reference(_) | Item::Copy(_) => continue,
+                    Item::Reference(..) | Item::Copy(_) => continue,
                 };
                 let (at, place) = streams.get(stream).copied().unwrap_or_default();
                 let taken = match raw {

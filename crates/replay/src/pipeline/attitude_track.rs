@@ -2,6 +2,7 @@
 //!
 //! Attitudes in NDJSON and CSV are our own outputs; all else goes through the same walk and decoders as a replay.
 
+use super::request::unsupported;
 use super::simulate::TRUTH_TOPIC;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
@@ -25,6 +26,7 @@ use strapd_recording::recording::channel_route::{Item, Route};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, rank};
 use strapd_recording::recording::opened::{AHEAD, problems};
+use strapd_recording::recording::sources::is_same;
 use strapd_recording::recording::topics;
 use strapd_recording::text::printable;
 
@@ -106,47 +108,33 @@ fn from_log(
     let path = input.name();
     let log = Recording::told_apart(input, topic, options, pool)?;
     let known = attitude_channel(path, &log, side, topic)?;
-    let decoder = known.decoder(&mut Decoders::default()).map_err(|why| {
-        strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what: Diagnostic::from(&why),
-        }
-    })?;
+    let decoder = known
+        .decoder(&mut Decoders::default())
+        .map_err(|why| unsupported(path, &why))?;
     let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
     let (mut resets, mut cuts) = (None, Vec::new());
-    // Of an Imu, what it says of its error.
-    let is_imu = known.channel.message_encoding == "cdr"
-        && known
-            .channel
-            .schema
-            .as_deref()
-            .is_some_and(|s| s.name == "sensor_msgs/msg/Imu");
-    let mut said: Vec<Option<Matrix3<f64>>> = Vec::new();
-    let wanted = known.channel.clone();
+    let mut covariances = Vec::new();
     let survey = log.walk::<Error>(
         AHEAD,
         pool,
         |channel| {
-            (channel.topic == wanted.topic && channel.id == wanted.id).then(|| {
-                let copied = is_imu.then(|| channel.clone());
-                Route::reference(decoder.clone()).copying(copied)
-            })
+            let reference = || Route::reference(decoder.clone()).with_covariances();
+            is_same(&known.channel, channel).then(reference)
         },
         |items| {
-            entries.extend(items.drain(..).filter_map(|item| match item {
-                Item::Reference(raw) => {
-                    let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
-                    let wxyz = raw.orientation?;
-                    cuts.extend(cut(&mut resets, &raw, stamp));
-                    Some((stamp, wxyz))
-                }
-                Item::Copy(message) => {
-                    said.push(imu_covariance(&message.data));
-                    None
-                }
-                _ => None,
-            }));
+            for item in items.drain(..) {
+                let Item::Reference(raw, covariance) = item else {
+                    continue;
+                };
+                let Some(wxyz) = raw.orientation else {
+                    continue;
+                };
+                let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
+                cuts.extend(cut(&mut resets, &raw, stamp));
+                entries.push((stamp, wxyz));
+                covariances.push(covariance.map(|rows| Matrix3::from_row_slice(&rows[..])));
+            }
             Ok(std::ops::ControlFlow::Continue(()))
         },
     )?;
@@ -157,15 +145,10 @@ fn from_log(
         .or_else(|| labels.get(&format!("{} world", known.channel.topic)));
     let convention = world.map_or(stated, |world| convention_of(world));
     // About which axes another program's are is known of none.
-    let covariances = if world.is_some() && said.len() == entries.len() {
-        let pairs = entries.iter().zip(&said);
-        pairs
-            .map(|((_, wxyz), said)| in_body((*said)?, convention, *wxyz))
-            .collect::<Option<Vec<_>>>()
-            .unwrap_or_default()
-    } else {
-        Vec::new()
-    };
+    let pairs = entries.iter().zip(covariances);
+    let covariances: Option<Vec<AttitudeCovariance>> = pairs
+        .map(|((_, wxyz), said)| in_body(said.filter(|_| world.is_some())?, convention, *wxyz))
+        .collect();
     for (_, wxyz) in &mut entries {
         *wxyz = in_flu(convention, *wxyz);
     }
@@ -173,7 +156,7 @@ fn from_log(
         name: format!("{} {}", path.display(), known.channel.topic),
         entries,
         cuts,
-        covariances,
+        covariances: covariances.unwrap_or_default(),
         problems: problems(&survey),
     })
 }
@@ -198,26 +181,6 @@ fn convention_of(world: &str) -> Convention {
 fn in_flu(recorded: Convention, wxyz: [f64; 4]) -> [f64; 4] {
     Quaternion::<Nav, Body>::try_from_wxyz(wxyz)
         .map_or(wxyz, |q| recorded.convert(Convention::EnuFlu, q).wxyz())
-}
-
-/// The covariance of the orientation in a `sensor_msgs/msg/Imu`, CDR, least byte first as everybody writes it;
-/// `None` where it is cut.
-fn imu_covariance(payload: &[u8]) -> Option<Matrix3<f64>> {
-    /// Encapsulation; then sec, nanosec and the length of the frame's name.
-    const HEAD: usize = 4;
-    let data = payload.get(HEAD..).filter(|_| payload.get(1) == Some(&1))?;
-    let length: [u8; 4] = data.get(8..12)?.try_into().ok()?;
-    let numbers = 12usize
-        .checked_add(u32::from_le_bytes(length) as usize)?
-        .next_multiple_of(8);
-    // Behind the four of the quaternion.
-    let covariance = data.get(numbers.checked_add(4 * 8)?..)?.get(..9 * 8)?;
-    let read = |n: usize| {
-        let bytes = covariance.get(8 * n..8 * n + 8)?.try_into().ok()?;
-        Some(f64::from_le_bytes(bytes))
-    };
-    let numbers: Option<Vec<f64>> = (0..9).map(read).collect();
-    Some(Matrix3::from_row_slice(&numbers?))
 }
 
 /// A covariance about the world's axes of `convention`, as our own Imu messages have it, about the body's (FLU).
@@ -269,27 +232,18 @@ fn attitude_channel<'l>(
         .collect();
     all.sort_by_key(|(goodness, _)| std::cmp::Reverse(*goodness));
     match all.as_slice() {
-        [] => Err(strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what: format!(
-                "holds no attitude; it holds:{}",
-                topics::listing(&log.candidates())
-            )
-            .into(),
+        [] => {
+            let holds = topics::listing(&log.candidates());
+            let what = format!("holds no attitude; it holds:{holds}");
+            Err(unsupported(path, what))
         }
-        .into()),
         [(best, known), rest @ ..] if rest.first().is_none_or(|(next, _)| next < best) => Ok(known),
         several => {
             let list: Vec<_> = several.iter().map(|(_, k)| k.candidate()).collect();
-            Err(strapd_recording::Error::Unsupported {
-                path: path.to_owned(),
-                what: Diagnostic::new(format!(
-                    "several topics carry an attitude:{}",
-                    topics::listing(&list)
-                ))
-                .help(format!("{TOPIC} NAME (or {REF_TOPIC} NAME) takes one")),
-            }
-            .into())
+            let list = topics::listing(&list);
+            let what = Diagnostic::new(format!("several topics carry an attitude:{list}"))
+                .help(format!("{TOPIC} NAME (or {REF_TOPIC} NAME) takes one"));
+            Err(unsupported(path, what))
         }
     }
 }
@@ -426,11 +380,8 @@ struct Row {
 fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
     let refuse = |what: String| {
-        strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what: Diagnostic::new(what.to_string()).help("columns stamp_ns,qw,qx,qy,qz are needed"),
-        }
-        .into()
+        let what = Diagnostic::new(what).help("columns stamp_ns,qw,qx,qy,qz are needed");
+        unsupported(path, what)
     };
     let mut track = Vec::new();
     for row in csv::Reader::from_reader(BufReader::new(input.text(&Options::default())?))
@@ -453,9 +404,5 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {
-    strapd_recording::Error::Unsupported {
-        path: path.to_owned(),
-        what: format!("line {number}: {what}").into(),
-    }
-    .into()
+    unsupported(path, format!("line {number}: {what}"))
 }

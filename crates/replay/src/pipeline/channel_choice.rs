@@ -3,11 +3,11 @@
 //! Apart from the replay because it is all choice and no work: which topics, under which names, held
 //! against which reference.
 
-use super::request::ReplayRequest;
+use super::request::{ReplayRequest, unsupported};
 use super::session::Found;
 use crate::error::{Error, Result};
 use crate::sink::{Stream, output_topic};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -21,24 +21,22 @@ use strapd_recording::recording::channel_route::{Noticed, Route, Taker};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::recording::sources::{Publisher, is_same};
+use strapd_recording::recording::topic_plan::{self, TopicPlan};
 use strapd_recording::recording::topics;
 
-/// A topic that was chosen, and how its channels are read.
-pub(super) struct Chosen {
+/// A topic that was chosen, and how it is read.
+pub(super) struct Chosen<'l> {
     pub(super) found: Found,
     pub(super) stream: Stream,
-    source: Publisher,
-    /// Decoders by id and schema id: the index of a channel met in a walk may differ from the survey's, since the
-    /// summary lists them in another order.
-    channels: BTreeMap<(u16, u16), Decoder>,
+    plan: TopicPlan<'l>,
 }
 
-pub(super) fn choose(
+pub(super) fn choose<'l>(
     run: &ReplayRequest,
     path: &Path,
-    log: &Recording,
+    log: &'l Recording,
     names: &[String],
-) -> Result<Vec<Chosen>> {
+) -> Result<Vec<Chosen<'l>>> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
     if run.copy_input {
         taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
@@ -55,13 +53,13 @@ pub(super) fn choose(
 }
 
 /// The same for topics that have nothing to do with each other.
-pub(super) fn choose_each(
+pub(super) fn choose_each<'l>(
     run: &ReplayRequest,
     path: &Path,
-    log: &Recording,
+    log: &'l Recording,
     names: &[String],
     decoders: &mut Decoders,
-) -> Vec<Result<Chosen>> {
+) -> Vec<Result<Chosen<'l>>> {
     let taken = BTreeSet::new();
     names
         .iter()
@@ -69,79 +67,35 @@ pub(super) fn choose_each(
         .collect()
 }
 
-fn choose_one(
+fn choose_one<'l>(
     run: &ReplayRequest,
-    (path, log): (&Path, &Recording),
+    (path, log): (&Path, &'l Recording),
     name: &str,
     taken: &BTreeSet<String>,
     decoders: &mut Decoders,
-) -> Result<Chosen> {
-    let mut channels = Vec::new();
-    let mut refusals = Vec::new();
-    let Some(source) = log.source(name) else {
-        return Err(strapd_recording::Error::NoSuchTopic {
-            path: path.to_owned(),
-            topic: name.to_owned(),
-            topics: topics::listing(&log.candidates()),
-        }
-        .into());
-    };
-    for known in log.channels_of(&source) {
-        match known.decoder(decoders) {
-            Ok(decoder) => channels.push((known, decoder)),
-            Err(why) => refusals.push(Diagnostic::from(&why)),
-        }
-    }
-    let Some((first, decoder)) = channels.first() else {
-        let none = || Diagnostic::new("no channel of it");
-        let what = refusals.into_iter().next().unwrap_or_else(none);
-        return Err(strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what,
-        }
-        .into());
-    };
-    if !decoder.stated().has_gyro {
-        return Err(strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what: Diagnostic::new(format!(
-                "{} ({}): carries no body rate",
-                strapd_recording::text::printable(name),
-                described(&first.channel)
-            ))
-            .help(format!("{FIELD} gyro=PATH names one")),
-        }
-        .into());
-    }
-    let frame = source.frame.clone().or_else(|| {
-        let (_, payload) = first.first.as_ref()?;
-        decoder.frame_id(payload)
-    });
-    let frame = frame.unwrap_or_default();
-    let topic = output_topic(&plain_name(&source), taken);
-    let mut stream = Stream::new(name, &frame);
+) -> Result<Chosen<'l>> {
+    let plan = TopicPlan::named(log, name, decoders)?;
+    let (first, decoder) = plan.first_with_rate(path)?;
+    let topic = output_topic(&plain_name(&plan.source), taken);
+    let mut stream = Stream::new(name, &plan.frame());
     stream.output_topic = topic.clone();
     let found = Found {
         name: name.to_owned(),
         output_topic: topic,
         described: described(&first.channel),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),
-        noticed: Arc::new(Noticed::of(&source)),
-        warnings: refusals
-            .into_iter()
+        noticed: Arc::new(Noticed::of(&plan.source)),
+        warnings: plan
+            .refusals
+            .iter()
+            .map(Diagnostic::from)
             .chain(which_stamp(decoder).map(Into::into))
             .collect(),
     };
-    let mut by_id = BTreeMap::new();
-    for (known, decoder) in channels {
-        let id = (known.channel.id, known.channel.schema_id);
-        by_id.entry(id).or_insert(decoder);
-    }
     Ok(Chosen {
         found,
         stream,
-        source,
-        channels: by_id,
+        plan,
     })
 }
 
@@ -153,7 +107,7 @@ pub(super) fn besides(
     run: &ReplayRequest,
     path: &Path,
     log: &Recording,
-    chosen: &mut [Chosen],
+    chosen: &mut [Chosen<'_>],
 ) -> Result<Besides> {
     let asked = run.selection.accel.as_ref().or(run.selection.mag.as_ref());
     let [one] = chosen else {
@@ -169,8 +123,8 @@ pub(super) fn besides(
         }
         return Ok(Besides::default());
     };
-    let has_field = one.channels.values().any(|d| d.stated().has_mag);
-    let own = (one.source.topic.as_str(), has_field);
+    let has_field = one.plan.channels.iter().any(|(_, d)| d.stated().has_mag);
+    let own = (one.plan.source.topic.as_str(), has_field);
     let mut besides = beside::choose((&run.plan, &run.selection), path, log, own)?;
     one.found
         .warnings
@@ -215,8 +169,8 @@ pub(super) struct Reference {
 
 impl Reference {
     /// Whether it lies on the very topic of the samples.
-    pub(super) fn is_of(&self, chosen: &Chosen) -> bool {
-        self.channel.topic == chosen.source.topic
+    pub(super) fn is_of(&self, chosen: &Chosen<'_>) -> bool {
+        self.channel.topic == chosen.plan.source.topic
     }
 }
 
@@ -226,13 +180,16 @@ pub(super) fn reference(
     run: &ReplayRequest,
     path: &Path,
     log: &Recording,
-    chosen: &[Chosen],
+    chosen: &[Chosen<'_>],
     apart: bool,
 ) -> Result<Option<Reference>> {
     let Some(asked) = &run.against else {
         return Ok(None);
     };
-    let names: BTreeSet<&str> = chosen.iter().map(|c| c.source.topic.as_str()).collect();
+    let names: BTreeSet<&str> = chosen
+        .iter()
+        .map(|c| c.plan.source.topic.as_str())
+        .collect();
     let taken = |k: &&LogChannel| names.contains(k.channel.topic.as_str());
     let found = if asked.is_empty() {
         let is_other_body = |k: &LogChannel| {
@@ -262,12 +219,9 @@ pub(super) fn reference(
         }
         named
     };
-    let decoder = found.decoder(&mut Decoders::default()).map_err(|why| {
-        strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what: Diagnostic::from(&why),
-        }
-    })?;
+    let decoder = found
+        .decoder(&mut Decoders::default())
+        .map_err(|why| unsupported(path, &why))?;
     Ok(Some(Reference {
         channel: found.channel.clone(),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),
@@ -275,39 +229,27 @@ pub(super) fn reference(
     }))
 }
 
-/// The decoder of a channel's messages and the streams they may belong to: of several, the one of the
-/// frame that a message names.
-fn find<'c>(chosen: &'c [Chosen], channel: &Channel) -> Option<(&'c Decoder, Vec<usize>)> {
-    let mut decoder = None;
-    let mut streams = Vec::new();
-    let id = (channel.id, channel.schema_id);
-    for (stream, c) in chosen.iter().enumerate() {
-        if c.source.topic == channel.topic
-            && let Some(own) = c.channels.get(&id)
-        {
-            decoder.get_or_insert(own);
-            streams.push(stream);
-        }
-    }
-    Some((decoder?, streams))
+/// The way of a channel's messages to the streams, with what is noticed put aside.
+pub(super) fn looked_at(chosen: &[Chosen<'_>], channel: &Channel) -> Option<Route> {
+    to_streams(chosen, channel, |chosen| {
+        Arc::new(Noticed::of(&chosen.plan.source))
+    })
 }
 
-/// The way of a channel's messages to the streams, with what is noticed put aside.
-pub(super) fn looked_at(chosen: &[Chosen], channel: &Channel) -> Option<Route> {
-    let (decoder, streams) = find(chosen, channel)?;
-    let taker = |stream: usize| {
-        let noticed = chosen.get(stream).map(|c| Noticed::of(&c.source));
-        Taker {
-            stream,
-            noticed: Arc::new(noticed.unwrap_or_default()),
-        }
-    };
-    let takers = streams.into_iter().map(taker).collect();
-    Some(Route::to(decoder.clone(), takers))
+fn to_streams(
+    chosen: &[Chosen<'_>],
+    channel: &Channel,
+    noticed: impl Fn(&Chosen<'_>) -> Arc<Noticed>,
+) -> Option<Route> {
+    let plans = chosen.iter().map(|c| &c.plan);
+    topic_plan::route(plans, channel, |stream, _| Taker {
+        stream,
+        noticed: chosen.get(stream).map(&noticed).unwrap_or_default(),
+    })
 }
 
 pub(super) fn route(
-    chosen: &[Chosen],
+    chosen: &[Chosen<'_>],
     reference: Option<&Reference>,
     besides: &Besides,
     copy_input: bool,
@@ -317,20 +259,12 @@ pub(super) fn route(
     let copied = copy_input.then(|| channel.clone());
     let compared = reference.filter(|r| is_same(&r.channel, channel));
     let compared = compared.map(|r| r.decoder.clone());
-    if let Some((decoder, streams)) = find(chosen, channel) {
-        let taker = |stream: usize| {
-            let noticed = chosen.get(stream).map(|c| c.found.noticed.clone());
-            Taker {
-                stream,
-                noticed: noticed.unwrap_or_default(),
-            }
-        };
-        let takers = streams.into_iter().map(taker).collect();
-        let route = Route::to(decoder.clone(), takers);
-        return Some(route.comparing(compared).beside(beside).copying(copied));
-    }
-    match compared {
-        Some(decoder) => Some(Route::reference(decoder).beside(beside).copying(copied)),
-        None => Route::other(beside, copied),
+    let samples = to_streams(chosen, channel, |chosen| chosen.found.noticed.clone());
+    match (samples, compared) {
+        (Some(samples), compared) => {
+            Some(samples.comparing(compared).beside(beside).copying(copied))
+        }
+        (None, Some(decoder)) => Some(Route::reference(decoder).beside(beside).copying(copied)),
+        (None, None) => Route::other(beside, copied),
     }
 }

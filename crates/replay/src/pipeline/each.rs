@@ -12,7 +12,7 @@ use super::position::Position;
 use super::replay::{done, prepare};
 use super::request::ReplayRequest;
 use super::session::{Session, Topic};
-use super::session_builder::labelled;
+use super::session_builder::topic;
 use super::summarise;
 use super::summarise::Told;
 use crate::error::{Error, Result};
@@ -39,7 +39,7 @@ pub(super) fn each(
     let path = log.name();
     let mut decoders = Decoders::of_run(&run.plan, &run.selection.decode);
     let mut told: Vec<Option<Told>> = Vec::new();
-    let mut chosen: Vec<Chosen> = Vec::new();
+    let mut chosen: Vec<Chosen<'_>> = Vec::new();
     for found in choose_each(run, path, log, names, &mut decoders) {
         told.push(found.map_or_else(
             |refused| Some(Err(Diagnostic::from(&refused))),
@@ -69,13 +69,8 @@ pub(super) fn each(
     let mut open = told.iter_mut().filter(|told| told.is_none());
     for (chosen, prepared) in chosen.into_iter().zip(prepared) {
         let begun = prepared.and_then(|prepared| {
-            let (plan, found) = (&run.plan, chosen.found.clone());
-            let stream = labelled(chosen.stream.clone(), plan, &found.resolved, &prepared);
-            let mut topic = Topic::new(path, plan, found, prepared, run.against.is_some())?;
-            if plan.smooth {
-                topic.spool_beside(&run.targets);
-            }
-            Ok((topic, stream))
+            let start = (chosen.found.clone(), chosen.stream.clone());
+            topic(run, path, start, prepared)
         });
         let slot = open.next();
         match begun {

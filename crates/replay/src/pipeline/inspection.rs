@@ -1,10 +1,10 @@
 //! A log's topics of samples -> how good they are: statistics, rests, clocks. I/O.
 //!
-//! Apart from the replay because it integrates nothing: `info` and `check` look before anyone leaps.
+//! Apart from the replay because it integrates nothing: `info`, `check` and `report` look before anyone leaps.
 
+use super::request;
 use crate::error::{Error, Result};
 use crate::inspection::{Aids, Inspection};
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::condition::quality::Quality;
@@ -15,16 +15,17 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
-use strapd_recording::decode::{self, Options};
-use strapd_recording::mcap::{self, Survey};
+use strapd_recording::decode::Options;
+use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::Vectors;
-use strapd_recording::recording::channel_route::{Item, Noticed, Route, Taker};
+use strapd_recording::recording::channel_route::{Item, Noticed, Taker};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::recording::opened::AHEAD;
 use strapd_recording::recording::payload_type::PayloadType;
 use strapd_recording::recording::sources::Publisher;
+use strapd_recording::recording::topic_plan::{self, TopicPlan};
 use strapd_recording::recording::topics::{MOST_TOPICS, PICKED_UNNAMED};
 
 /// Result of looking at a log.
@@ -180,56 +181,33 @@ pub(crate) fn look_as(
 ) -> Result<Looks> {
     let path = log.name();
     let (wanted, left_out) = wanted(log, named);
-    let mut looks: Vec<Look> = Vec::new();
-    let mut compiled = Decoders::of_run(plan, options);
-    let mut decoders: BTreeMap<Id<'_>, (decode::Decoder, Vec<Taker>)> = BTreeMap::new();
+    let unsupported = |what: Diagnostic| request::unsupported(path, what);
+    let mut decoders = Decoders::of_run(plan, options);
+    let (mut looks, mut plans): (Vec<Look>, Vec<TopicPlan<'_>>) = Default::default();
     for (source, is_named) in wanted {
-        let noticed = Arc::new(Noticed::of(source));
-        let mut begun = None;
-        for known in log.channels_of(source) {
-            if known.rank() < PICKED_UNNAMED && !is_named {
-                continue;
+        let is_likely = |known: &LogChannel| is_named || known.rank() >= PICKED_UNNAMED;
+        let of_topic = TopicPlan::of(log, source.clone(), &mut decoders, is_likely);
+        for why in &of_topic.refusals {
+            if named.is_some() {
+                return Err(unsupported(Diagnostic::from(why)));
             }
-            let decoder = match known.decoder(&mut compiled) {
-                Ok(decoder) => decoder,
-                Err(why) if named.is_some() => {
-                    return Err(strapd_recording::Error::Unsupported {
-                        path: path.to_owned(),
-                        what: Diagnostic::from(&why),
-                    }
-                    .into());
-                }
-                Err(why) => {
-                    tracing::warn!("{why}");
-                    continue;
-                }
-            };
-            let stream = *begun.get_or_insert_with(|| {
-                looks.push(begin(source, known, &decoder, plan));
-                looks.len() - 1
-            });
-            let (_, takers) = decoders
-                .entry(id(&known.channel))
-                .or_insert_with(|| (decoder, Vec::new()));
-            takers.push(Taker {
-                stream,
-                noticed: noticed.clone(),
-            });
+            tracing::warn!("{why}");
+        }
+        if let Some(look) = begin(&of_topic, plan) {
+            looks.push(look);
+            plans.push(of_topic);
         }
     }
-    let unsupported = |what: Diagnostic| {
-        strapd_recording::Error::Unsupported {
-            path: path.to_owned(),
-            what,
-        }
-        .into()
-    };
+    let noticed = |source: &Publisher| Arc::new(Noticed::of(source));
+    let noticed: Vec<Arc<Noticed>> = plans.iter().map(|of| noticed(&of.source)).collect();
     let survey = log.walk::<Error>(
         AHEAD,
         pool,
         |channel| {
-            let (decoder, takers) = decoders.get(&id(channel))?;
-            Some(Route::to(decoder.clone(), takers.clone()))
+            topic_plan::route(plans.iter(), channel, |stream, _| Taker {
+                stream,
+                noticed: noticed.get(stream).cloned().unwrap_or_default(),
+            })
         },
         |items| {
             for item in items.drain(..) {
@@ -244,7 +222,7 @@ pub(crate) fn look_as(
                             look.undecodable += 1;
                         }
                     }
-                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => {}
+                    Item::Reference(..) | Item::Beside(_) | Item::Copy(_) => {}
                 }
             }
             Ok(ControlFlow::Continue(()))
@@ -289,13 +267,6 @@ fn has_reference_beside(log: &Recording, of: &str, frame: &str) -> bool {
     matches!((others.next(), others.next()), (Some(one), None) if !one.role.has_rate)
 }
 
-/// Identity that a channel of the survey and one met in a walk share; the index may differ.
-type Id<'c> = (u16, u16, &'c str);
-
-fn id(channel: &mcap::Channel) -> Id<'_> {
-    (channel.id, channel.schema_id, channel.topic.as_str())
-}
-
 /// The sources to look at, with whether they are named, in the order of the log; and the names of those that are
 /// too many: what is named and the best ranks come first.
 fn wanted<'l>(
@@ -322,21 +293,14 @@ fn wanted<'l>(
     )
 }
 
-fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan: &Plan) -> Look {
+fn begin(of_topic: &TopicPlan<'_>, plan: &Plan) -> Option<Look> {
+    let (known, decoder) = of_topic.channels.first()?;
     let resolved = Meaning::new(plan, &decoder.stated().declared);
-    let first_frame = || {
-        let (_, payload) = known.first.as_ref()?;
-        decoder.frame_id(payload)
-    };
-    Look {
-        topic: source.name.clone(),
-        of: source.topic.clone(),
+    Some(Look {
+        topic: of_topic.source.name.clone(),
+        of: of_topic.source.topic.clone(),
         described: described(&known.channel),
-        frame: source
-            .frame
-            .clone()
-            .or_else(first_frame)
-            .unwrap_or_default(),
+        frame: of_topic.frame(),
         kind_stated: decoder.stated().declared.sample_kind.is_some(),
         first: Vec::new(),
         beside: Vec::new(),
@@ -351,5 +315,5 @@ fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan
         undecodable: 0,
         plan: plan.clone(),
         aid: Aids::default(),
-    }
+    })
 }

@@ -2,8 +2,8 @@
 
 use super::position::Position;
 use super::replay::integrated_again;
-use super::replay_start::{Waiting, preparation};
-use super::request::{ReplayRequest, refused};
+use super::replay_start::StreamStart;
+use super::request::ReplayRequest;
 use super::session::Found;
 use super::summarise;
 use crate::error::{Error, Result};
@@ -12,11 +12,10 @@ use crate::summary::RunSummary;
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Meaning, Patience, Preparation, Prepared};
+use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_recording::MadeBefore;
 use strapd_recording::Selection;
 use strapd_recording::lines::Lines;
@@ -40,42 +39,42 @@ pub(super) fn replay(
     let mut running = Running {
         run,
         made_before: MadeBefore::in_lines(&input),
-        waiting: Waiting::new(run, &path, prepared),
+        start: StreamStart::new(run, &path, prepared),
         pool,
         watch,
     };
-    let mut survey = Survey::default();
-    survey.facts.format = input.format();
     read(wanted(run), input, &path, &mut running)?;
-    let ended = running.waiting.into_session(pool)?.finish(run, pool)?;
-    Ok(summarise::run(run, ended, &survey))
+    let ended = running.start.into_session(pool)?.finish(run, pool)?;
+    Ok(summarise::run(run, ended, &Survey::default()))
 }
 
 /// Reads a file of lines as far as is needed to know how it begins, as any other file; `None` where it holds no sensor.
 ///
 /// # Errors
 /// As [`replay`].
-pub(super) fn prepare(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Option<Prepared>> {
+pub(super) fn prepare(
+    run: &ReplayRequest,
+    input: Lines<impl Read>,
+    pool: &Pool,
+) -> Result<Option<Prepared>> {
     let path = run.source.name();
-    let mut looking = Looking {
+    let mut looking = Running {
         run,
-        path: &path,
-        preparation: None,
+        made_before: None,
+        start: StreamStart::look(run, &path),
+        pool,
+        watch: &mut |_| {},
     };
     read(wanted(run), input, &path, &mut looking)?;
-    let decided = looking.preparation.map(|(name, preparation)| {
-        let decided = preparation.decide();
-        decided.map_err(|what| refused(&path, &name, what))
-    });
-    decided.transpose()
+    looking.start.into_prepared()
 }
 
-/// A run.
+/// A run, or the look before it.
 struct Running<'r, 'w> {
     run: &'r ReplayRequest,
     /// Origin of attitudes that are no recording.
     made_before: Option<MadeBefore>,
-    waiting: Waiting<'r>,
+    start: StreamStart<'r>,
     pool: &'r Pool,
     watch: &'w mut dyn FnMut(&Position),
 }
@@ -90,12 +89,12 @@ impl SensorTaker for Running<'_, '_> {
         {
             found.warnings.push(integrated_again(made));
         }
-        self.waiting.meet(&mut Some((found, stream)))
+        self.start.meet(found, stream)
     }
 
     fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>> {
-        let flow = self.waiting.consume(items.drain(..), self.pool)?;
-        (self.watch)(&self.waiting.position());
+        let flow = self.start.consume(items.drain(..), self.pool)?;
+        (self.watch)(&self.start.position());
         Ok(match flow {
             Flow::Continue => ControlFlow::Continue(()),
             Flow::Closed => ControlFlow::Break(()),
@@ -103,46 +102,7 @@ impl SensorTaker for Running<'_, '_> {
     }
 
     fn pause(&mut self) -> Result<()> {
-        self.waiting.flush_to_readers(self.pool)
-    }
-}
-
-/// The pass before the run.
-struct Looking<'r> {
-    run: &'r ReplayRequest,
-    path: &'r Path,
-    preparation: Option<(String, Preparation)>,
-}
-
-impl SensorTaker for Looking<'_> {
-    type Error = Error;
-
-    fn meet(&mut self, sensor: Sensor) -> Result<()> {
-        let (found, _) = met(self.run, sensor);
-        let preparation = preparation(self.run, &found, Patience::WholeLog);
-        self.preparation = Some((found.name, preparation));
-        Ok(())
-    }
-
-    fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>> {
-        let Some((name, preparation)) = &mut self.preparation else {
-            return Ok(ControlFlow::Continue(()));
-        };
-        for item in items.drain(..) {
-            if let Item::Sample(_, raw) = item {
-                preparation
-                    .take(&raw)
-                    .map_err(|what| refused(self.path, name, what))?;
-            }
-        }
-        Ok(match preparation.wants_more() {
-            true => ControlFlow::Continue(()),
-            false => ControlFlow::Break(()),
-        })
-    }
-
-    fn pause(&mut self) -> Result<()> {
-        Ok(())
+        self.start.flush_to_readers(self.pool)
     }
 }
 

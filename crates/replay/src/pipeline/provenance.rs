@@ -2,14 +2,13 @@
 //! of the input.
 
 use super::request::ReplayRequest;
-use super::session::Found;
+use super::session::Topic;
 use crate::error::Result;
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use strapd_attitude::estimate::Prepared;
 use strapd_attitude::worlds::EARTH_RATE;
 use strapd_recording::Source;
 
@@ -20,12 +19,7 @@ const END: u64 = 1 << 20;
 ///
 /// # Errors
 /// The input cannot be read again.
-pub fn of(
-    run: &ReplayRequest,
-    founds: &[Found],
-    prepared: &[Prepared],
-    streams: &[Stream],
-) -> Result<Provenance> {
+pub(super) fn of(run: &ReplayRequest, topics: &[Topic], streams: &[Stream]) -> Result<Provenance> {
     let mut provenance = Provenance::default();
     let mut put = |key: String, value: String| {
         provenance.metadata.insert(key, value);
@@ -54,23 +48,24 @@ pub fn of(
         let prints = prints.collect::<Result<Vec<String>>>()?;
         put("input_fingerprint".to_owned(), prints.join(", "));
     }
-    for ((found, prepared), stream) in founds.iter().zip(prepared).zip(streams) {
-        let key = |name: &str| match founds {
+    for (topic, stream) in topics.iter().zip(streams) {
+        let prepared = &topic.prepared;
+        let key = |name: &str| match topics {
             [_] => name.to_owned(),
             _ => format!("{} {name}", stream.output_topic),
         };
         let [w, x, y, z] = prepared.initial.wxyz();
         let [bx, by, bz]: [f64; 3] = prepared.bias.into();
-        put(key("topic"), found.name.clone());
+        put(key("topic"), topic.name.clone());
         put(key("output_topic"), stream.output_topic.clone());
-        put(key("sample_kind"), found.resolved.kind.name().to_owned());
-        put(key("gyro_unit"), found.resolved.unit.name().to_owned());
-        put(key("input_axes"), found.resolved.body.to_string());
+        put(key("sample_kind"), topic.resolved.kind.name().to_owned());
+        put(key("gyro_unit"), topic.resolved.unit.name().to_owned());
+        put(key("input_axes"), topic.resolved.body.to_string());
         if let Some(aiding) = &prepared.aiding {
             put(key("aid"), aiding.name().to_owned());
         }
         put(key("clock"), prepared.clock.name().to_owned());
-        if let Some(words) = prepared.stamps.words(found.resolved.kind) {
+        if let Some(words) = prepared.stamps.words(topic.resolved.kind) {
             put(key("stamps"), words);
         }
         put(key("rotates"), stream.rotates.clone());

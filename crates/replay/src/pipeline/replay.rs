@@ -7,12 +7,11 @@ use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route
 use super::position::Position;
 use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
-use super::session::Found;
-use super::session_builder::{begin, labelled};
+use super::session_builder::begin;
 use super::summarise;
 use super::{lines, logged, replay_stream};
 use crate::error::{Error, Result};
-use crate::sink::{Flow, Stream};
+use crate::sink::Flow;
 use crate::summary::{RunSummary, human_bytes};
 use std::io::Read;
 use std::ops::ControlFlow;
@@ -98,7 +97,7 @@ fn whole_text(
         return file(run, input, pool, watch);
     }
     let text = || input.lines(&run.selection.decode);
-    let prepared = lines::prepare(run, text()?)?;
+    let prepared = lines::prepare(run, text()?, pool)?;
     lines::replay(run, text()?, prepared, pool, watch)
 }
 
@@ -138,14 +137,8 @@ fn file(
     let prepared = prepare(run, &log, &chosen, pool)?
         .into_iter()
         .collect::<Result<Vec<Prepared>>>()?;
-
-    let streams: Vec<Stream> = chosen
-        .iter()
-        .zip(&prepared)
-        .map(|(c, p)| labelled(c.stream.clone(), &run.plan, &c.found.resolved, p))
-        .collect();
-    let founds: Vec<Found> = chosen.iter().map(|c| c.found.clone()).collect();
-    let mut session = begin(run, path, founds, prepared, &streams)?;
+    let starts = chosen.iter().map(|c| (c.found.clone(), c.stream.clone()));
+    let mut session = begin(run, path, starts.zip(prepared))?;
     if let (Some(reference), Some(topic)) = (&reference, session.topics.first_mut())
         && let Some(against) = &mut topic.against
     {
@@ -195,7 +188,7 @@ pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
 pub(super) fn prepare(
     run: &ReplayRequest,
     log: &Recording,
-    chosen: &[Chosen],
+    chosen: &[Chosen<'_>],
     pool: &Pool,
 ) -> Result<Vec<Result<Prepared>>> {
     let mut preparations: Vec<Preparation> = chosen
@@ -244,7 +237,7 @@ pub(super) fn prepare(
 
 fn log_time(item: &Item) -> Option<u64> {
     match item {
-        Item::Sample(_, raw) | Item::Reference(raw) | Item::Beside(raw) => {
+        Item::Sample(_, raw) | Item::Reference(raw, _) | Item::Beside(raw) => {
             u64::try_from(raw.log.0).ok()
         }
         Item::Undecodable(_, why) => u64::try_from(why.0.0).ok(),

@@ -4,7 +4,7 @@
 use super::position::Position;
 use super::request::{ReplayRequest, refused};
 use super::session::{Found, Session};
-use super::session_builder::{begin, labelled};
+use super::session_builder::begin;
 use crate::error::Result;
 use crate::sink::{Flow, Stream};
 use std::path::Path;
@@ -19,43 +19,55 @@ pub(super) fn preparation(run: &ReplayRequest, found: &Found, patience: Patience
     Preparation::new(&run.plan, &found.resolved, patience).with_stamps(stamps)
 }
 
-/// A run over a stream: first gathers, then runs; over a file that was read before, runs at once.
-pub(super) struct Waiting<'r> {
+/// Beginning of a run over what comes once, or of a look at what comes again.
+pub(super) struct StreamStart<'r> {
     run: &'r ReplayRequest,
     path: &'r Path,
-    /// Decisions of a pass over the file, where it is one.
+    /// Decisions of a look that went before.
     prepared: Option<Prepared>,
     gathering: Option<(Found, Stream, Preparation)>,
-    held: Vec<Item>,
+    /// Items that wait for these decisions; `None` of a look, to which all comes again.
+    held: Option<Vec<Item>>,
     session: Option<Session>,
 }
 
-impl<'r> Waiting<'r> {
+impl<'r> StreamStart<'r> {
+    /// Makes a run: of a stream the first samples wait until enough has been seen.
     pub(super) fn new(
         run: &'r ReplayRequest,
         path: &'r Path,
         prepared: Option<Prepared>,
-    ) -> Waiting<'r> {
-        Waiting {
+    ) -> StreamStart<'r> {
+        StreamStart {
             run,
             path,
             prepared,
             gathering: None,
-            held: Vec::new(),
+            held: Some(Vec::new()),
             session: None,
         }
     }
 
-    /// The stream's topic is known.
-    pub(super) fn meet(&mut self, found: &mut Option<(Found, Stream)>) -> Result<()> {
-        if let Some((found, stream)) = found.take() {
-            if let Some(prepared) = self.prepared.take() {
-                self.session = Some(self.session(found, stream, prepared)?);
-                return Ok(());
-            }
-            let preparation = preparation(self.run, &found, Patience::FirstMinute);
-            self.gathering = Some((found, stream, preparation));
+    /// Makes a look, which ends when no more would be learned.
+    pub(super) fn look(run: &'r ReplayRequest, path: &'r Path) -> StreamStart<'r> {
+        StreamStart {
+            held: None,
+            ..StreamStart::new(run, path, None)
         }
+    }
+
+    /// Takes note of the topic once it is known.
+    pub(super) fn meet(&mut self, found: Found, stream: Stream) -> Result<()> {
+        if let Some(prepared) = self.prepared.take() {
+            self.session = Some(self.session(found, stream, prepared)?);
+            return Ok(());
+        }
+        let patience = match self.held {
+            Some(_) => Patience::FirstMinute,
+            None => Patience::WholeLog,
+        };
+        let preparation = preparation(self.run, &found, patience);
+        self.gathering = Some((found, stream, preparation));
         Ok(())
     }
 
@@ -70,46 +82,62 @@ impl<'r> Waiting<'r> {
         pool: &Pool,
     ) -> Result<Flow> {
         if let Some(session) = &mut self.session {
-            let held = std::mem::take(&mut self.held);
+            let held = std::mem::take(&mut self.held).unwrap_or_default();
             return session.consume(held.into_iter().chain(items), pool);
         }
-        let Some((found, _, preparation)) = &mut self.gathering else {
-            self.held.extend(items);
-            return Ok(Flow::Continue);
-        };
         for item in items {
-            if let Item::Sample(_, raw) = &item {
+            if let (Item::Sample(_, raw), Some((found, _, preparation))) =
+                (&item, &mut self.gathering)
+            {
                 preparation
                     .take(raw)
                     .map_err(|what| refused(self.path, &found.name, what))?;
             }
-            self.held.push(item);
+            if let Some(held) = &mut self.held {
+                held.push(item);
+            }
         }
-        if preparation.wants_more() {
-            return Ok(Flow::Continue);
+        match &self.gathering {
+            Some((_, _, preparation)) if !preparation.wants_more() => match self.held {
+                Some(_) => self.begin(pool),
+                None => Ok(Flow::Closed),
+            },
+            _ => Ok(Flow::Continue),
         }
-        self.begin(pool)
+    }
+
+    /// Decides from what was gathered.
+    fn decide(&mut self) -> Result<Option<(Found, Stream, Prepared)>> {
+        let Some((found, stream, preparation)) = self.gathering.take() else {
+            return Ok(None);
+        };
+        let prepared = preparation
+            .decide()
+            .map_err(|what| refused(self.path, &found.name, what))?;
+        Ok(Some((found, stream, prepared)))
     }
 
     fn begin(&mut self, pool: &Pool) -> Result<Flow> {
-        let Some((found, mut stream, preparation)) = self.gathering.take() else {
+        let Some((found, mut stream, prepared)) = self.decide()? else {
             return Ok(Flow::Continue);
         };
         // Read on this thread alone, so that the first message is the first.
         if let Some(frame) = found.noticed.frame_id.get() {
             stream.frame_id.clone_from(frame);
         }
-        let prepared = preparation
-            .decide()
-            .map_err(|what| refused(self.path, &found.name, what))?;
         let session = self.session(found, stream, prepared)?;
-        let held = std::mem::take(&mut self.held);
+        let held = std::mem::take(&mut self.held).unwrap_or_default();
         self.session.insert(session).consume(held.into_iter(), pool)
     }
 
     fn session(&self, found: Found, stream: Stream, prepared: Prepared) -> Result<Session> {
-        let stream = labelled(stream, &self.run.plan, &found.resolved, &prepared);
-        begin(self.run, self.path, vec![found], vec![prepared], &[stream])
+        let decided = std::iter::once(((found, stream), prepared));
+        begin(self.run, self.path, decided)
+    }
+
+    /// Ends a look: what was decided, `None` where no topic was met.
+    pub(super) fn into_prepared(mut self) -> Result<Option<Prepared>> {
+        Ok(self.decide()?.map(|(_, _, prepared)| prepared))
     }
 
     /// Pushes what is known out to whoever reads it as it comes.

@@ -5,8 +5,8 @@
 
 use super::channel_choice::which_stamp;
 use super::position::Position;
-use super::replay_start::Waiting;
-use super::request::ReplayRequest;
+use super::replay_start::StreamStart;
+use super::request::{ReplayRequest, unsupported};
 use super::session::Found;
 use super::summarise;
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::setting::TOPIC;
 use strapd_recording::TopicBeside;
-use strapd_recording::decode::{Decoder, Unsupported, Wanted};
+use strapd_recording::decode::{Decoder, Wanted};
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside;
@@ -41,7 +41,7 @@ pub(super) fn replay(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let path = run.source.name();
-    let mut waiting = Waiting::new(run, &path, None);
+    let mut start = StreamStart::new(run, &path, None);
     let mut failure = None;
     let picked = std::cell::RefCell::new(Picked {
         decoders: Decoders::of_run(&run.plan, &run.selection.decode),
@@ -60,12 +60,12 @@ pub(super) fn replay(
         |items| {
             let fed = picked.borrow_mut().feed(run, &path, items);
             let step = fed
-                .and_then(|()| waiting.meet(&mut picked.borrow_mut().found))
+                .and_then(|()| picked.borrow_mut().hand_over(&mut start))
                 .and_then(|()| picked.borrow().is_one_body(&path))
-                .and_then(|()| waiting.consume(items.drain(..), pool));
+                .and_then(|()| start.consume(items.drain(..), pool));
             match step {
                 Ok(Flow::Continue) => {
-                    watch(&waiting.position());
+                    watch(&start.position());
                     ControlFlow::Continue(())
                 }
                 Ok(Flow::Closed) => ControlFlow::Break(()),
@@ -82,14 +82,14 @@ pub(super) fn replay(
     let mut picked = picked.into_inner();
     let mut last = Vec::new();
     picked.release(run, &path, &mut last)?;
-    waiting.meet(&mut picked.found)?;
+    picked.hand_over(&mut start)?;
     if !last.is_empty() {
-        let _ = waiting.consume(last.drain(..), pool)?;
+        let _ = start.consume(last.drain(..), pool)?;
     }
-    if waiting.is_idle() {
+    if start.is_idle() {
         return Err(picked.nothing(run, &path, &report.survey));
     }
-    let session = waiting.into_session(pool)?;
+    let session = start.into_session(pool)?;
     let mut summary = summarise::run(run, session.finish(run, pool)?, &report.survey);
     if let Some(topic) = summary.topics.first_mut() {
         topic.findings.extend(picked.passed_over());
@@ -229,6 +229,14 @@ impl Picked {
         ));
     }
 
+    /// Hands the topic over, once it is settled.
+    fn hand_over(&mut self, start: &mut StreamStart<'_>) -> Result<()> {
+        match self.found.take() {
+            Some((found, stream)) => start.meet(found, stream),
+            None => Ok(()),
+        }
+    }
+
     /// Hands messages of channels whose first ones wait to these, and takes what comes of it.
     fn feed(&mut self, run: &ReplayRequest, path: &Path, items: &mut Vec<Item>) -> Result<()> {
         if self.held.is_empty() {
@@ -288,11 +296,7 @@ impl Picked {
     /// Why nothing was picked.
     fn nothing(self, run: &ReplayRequest, path: &Path, survey: &Survey) -> Error {
         if let Some(what) = self.refusals.into_iter().next() {
-            return strapd_recording::Error::Unsupported {
-                path: path.to_owned(),
-                what,
-            }
-            .into();
+            return unsupported(path, what);
         }
         let mut decoders = Decoders::default();
         let channels: Vec<LogChannel> = survey
@@ -303,18 +307,14 @@ impl Picked {
         let candidates: Vec<_> = channels.iter().map(LogChannel::candidate).collect();
         let error = match topics::choose(path, &candidates, run.selection.topic.as_deref()) {
             Err(e) => e,
-            Ok(choice) => strapd_recording::Error::Unsupported {
-                path: path.to_owned(),
-                what:
-                    Diagnostic::new(format!(
-                        "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come",
-                        choice.topics.join(", ")
-                    ))
-                    .help(format!(
-                        "{TOPIC} NAME"
-                    ))
-                ,
-            },
+            Ok(choice) => {
+                let what = format!(
+                    "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come",
+                    choice.topics.join(", ")
+                );
+                let what = Diagnostic::new(what).help(format!("{TOPIC} NAME"));
+                strapd_recording::Error::unsupported(path, what)
+            }
         };
         explained(error, &channels, &problems(survey)).into()
     }
@@ -336,12 +336,4 @@ impl Picked {
                 .help([TOPIC.to("NAME")])
         })
     }
-}
-
-fn unsupported(path: &Path, why: &Unsupported) -> Error {
-    strapd_recording::Error::Unsupported {
-        path: path.to_owned(),
-        what: Diagnostic::from(why),
-    }
-    .into()
 }

@@ -218,7 +218,7 @@ impl Topic {
 
 /// Facts about a topic before its first sample.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub(super) struct Found {
     /// Name.
     pub name: String,
     /// Topic of its attitude.
@@ -313,7 +313,7 @@ impl Session {
                 }
                 topic.first_undecodable.get_or_insert(*why);
             }
-            Item::Reference(raw) => {
+            Item::Reference(raw, _) => {
                 let against = self.topics.iter_mut().filter_map(|t| t.against.as_mut());
                 for against in against.filter(|a| a.is_held_against_another()) {
                     against.take_reference(&raw);

@@ -34,37 +34,46 @@ pub fn labelled(
     stream
 }
 
+/// A topic ready to run, and the labels of its output.
+///
+/// # Errors
+/// As [`Topic::new`].
+pub(super) fn topic(
+    run: &ReplayRequest,
+    path: &Path,
+    (found, stream): (Found, Stream),
+    prepared: Prepared,
+) -> Result<(Topic, Stream)> {
+    let stream = labelled(stream, &run.plan, &found.resolved, &prepared);
+    let mut topic = Topic::new(path, &run.plan, found, prepared, run.against.is_some())?;
+    if run.plan.smooth {
+        topic.spool_beside(&run.targets);
+    }
+    Ok((topic, stream))
+}
+
+/// Opens the outputs of topics and what was decided of each.
 pub(super) fn begin(
     run: &ReplayRequest,
     path: &Path,
-    founds: Vec<Found>,
-    prepared: Vec<Prepared>,
-    streams: &[Stream],
+    decided: impl Iterator<Item = ((Found, Stream), Prepared)>,
 ) -> Result<Session> {
-    let provenance = provenance::of(run, &founds, &prepared, streams)?;
-    let shows_recorded = run.audience.as_ref().is_some_and(|a| a.wants_recorded());
-    let topics = founds
-        .into_iter()
-        .zip(prepared)
-        .zip(streams)
-        .map(|((found, prepared), stream)| {
-            let track = shows_recorded.then(|| {
-                RecordedTrack::new(stream, streams.len() == 1, &found.resolved, &prepared)
-            });
-            let mut topic = Topic::new(path, &run.plan, found, prepared, run.against.is_some())?;
-            topic.recorded = track;
-            if run.plan.smooth {
-                topic.spool_beside(&run.targets);
-            }
-            Ok(topic)
-        })
-        .collect::<Result<Vec<_>>>()?;
-    let inputs = run.source.files();
+    let topics = decided.map(|(start, prepared)| topic(run, path, start, prepared));
+    let topics = topics.collect::<Result<Vec<_>>>()?;
+    let (mut topics, streams): (Vec<Topic>, Vec<Stream>) = topics.into_iter().unzip();
+    let provenance = provenance::of(run, &topics, &streams)?;
+    if run.audience.as_ref().is_some_and(|a| a.wants_recorded()) {
+        let is_alone = streams.len() == 1;
+        for (topic, stream) in topics.iter_mut().zip(&streams) {
+            let track = RecordedTrack::new(stream, is_alone, &topic.resolved, &topic.prepared);
+            topic.recorded = Some(track);
+        }
+    }
     let outlet = Outlet::open(
         &run.targets,
-        &inputs,
+        &run.source.files(),
         run.options,
-        streams,
+        &streams,
         &provenance,
         Delivery {
             out_rate: run.out_rate,

@@ -65,6 +65,61 @@ pub(crate) fn ros1(
     sample::<false>(payload, 4, 1, form, log, publish, outcome)
 }
 
+/// Returns the covariance of the orientation in a regular payload, row by row.
+pub(crate) fn orientation_covariance(payload: &[u8], is_cdr: bool) -> Option<[f64; 9]> {
+    fn of<const BIG: bool>(data: &[u8], head: usize, align: usize) -> Option<[f64; 9]> {
+        let body = Body::<BIG>::of(data, head, align)?;
+        Some(std::array::from_fn(|n| body.double(COVARIANCE + n)))
+    }
+    match payload.split_first_chunk::<4>() {
+        Some(([0, 1, ..], data)) if is_cdr => of::<false>(data, 0, 8),
+        Some(([0, 0, ..], data)) if is_cdr => of::<true>(data, 0, 8),
+        _ if is_cdr => None,
+        _ => of::<false>(payload, 4, 1),
+    }
+}
+
+/// Index of the first double of the orientation's covariance.
+const COVARIANCE: usize = 4;
+
+/// A payload that is all there: seconds, nanoseconds and the length of the frame's name, and the doubles behind it.
+struct Body<'a, const BIG: bool> {
+    header: &'a [u8; 12],
+    doubles: &'a [u8; BODY],
+}
+
+impl<'a, const BIG: bool> Body<'a, BIG> {
+    #[inline]
+    fn of(data: &'a [u8], head: usize, align: usize) -> Option<Self> {
+        let header = data.get(head..)?.first_chunk()?;
+        let start = (head + 12)
+            .checked_add(word::<BIG>(header, 8) as usize)?
+            .next_multiple_of(align);
+        let (doubles, rest) = data.get(start..)?.split_first_chunk::<BODY>()?;
+        (rest.len() <= super::MAX_PADDING).then_some(Body { header, doubles })
+    }
+
+    #[inline]
+    fn double(&self, n: usize) -> f64 {
+        let bytes = std::array::from_fn(|byte| self.doubles[8 * n + byte]);
+        if BIG {
+            f64::from_be_bytes(bytes)
+        } else {
+            f64::from_le_bytes(bytes)
+        }
+    }
+}
+
+#[inline]
+fn word<const BIG: bool>(header: &[u8; 12], at: usize) -> u32 {
+    let bytes = [header[at], header[at + 1], header[at + 2], header[at + 3]];
+    if BIG {
+        u32::from_be_bytes(bytes)
+    } else {
+        u32::from_le_bytes(bytes)
+    }
+}
+
 #[inline]
 fn sample<const BIG: bool>(
     data: &[u8],
@@ -75,47 +130,14 @@ fn sample<const BIG: bool>(
     publish: Nanos,
     outcome: &mut Decoded,
 ) -> Option<RawSample> {
-    let stamp: &[u8; 12] = data.get(head..)?.first_chunk()?;
-    let word = |at: usize| {
-        let bytes = [stamp[at], stamp[at + 1], stamp[at + 2], stamp[at + 3]];
-        if BIG {
-            u32::from_be_bytes(bytes)
-        } else {
-            u32::from_le_bytes(bytes)
-        }
-    };
+    let body = Body::<BIG>::of(data, head, align)?;
+    let double = |n: usize| body.double(n);
     // ROS 1 seconds are unsigned, ROS 2 seconds signed.
-    let sec = if align == 1 {
-        i64::from(word(0))
-    } else {
-        i64::from(word(0) as i32)
+    let sec = match (word::<BIG>(body.header, 0), align) {
+        (sec, 1) => i64::from(sec),
+        (sec, _) => i64::from(sec as i32),
     };
-    let nanosec = word(4);
-    let start = (head + 12)
-        .checked_add(word(8) as usize)?
-        .next_multiple_of(align);
-    let (body, rest) = data.get(start..)?.split_first_chunk::<BODY>()?;
-    if rest.len() > super::MAX_PADDING {
-        return None;
-    }
-    let double = |n: usize| {
-        let at = 8 * n;
-        let bytes = [
-            body[at],
-            body[at + 1],
-            body[at + 2],
-            body[at + 3],
-            body[at + 4],
-            body[at + 5],
-            body[at + 6],
-            body[at + 7],
-        ];
-        if BIG {
-            f64::from_be_bytes(bytes)
-        } else {
-            f64::from_le_bytes(bytes)
-        }
-    };
+    let nanosec = word::<BIG>(body.header, 4);
     outcome.stamps_carried += usize::from(nanosec >= 1_000_000_000);
     outcome.samples = 1;
     // Orientation x y z w, its covariance, rate, covariance, specific force, covariance.
@@ -133,7 +155,7 @@ fn sample<const BIG: bool>(
         mag: None,
         orientation: form.orientation(
             [double(3), double(0), double(1), double(2)],
-            is_mark(double(4)),
+            is_mark(double(COVARIANCE)),
         ),
         orientation_resets: None,
         interval_nanos: None,
