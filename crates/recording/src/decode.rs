@@ -381,16 +381,6 @@ impl Decoder {
         }
     }
 
-    /// Returns the covariance of the orientation that a payload states, about the axes of its world, rad^2, row by row;
-    /// `None` of messages other than `sensor_msgs/Imu`, and where the payload is cut.
-    #[must_use]
-    pub fn orientation_covariance(&self, payload: &[u8]) -> Option<[f64; 9]> {
-        match &self.plan {
-            Plan::Ros(plan) => plan.orientation_covariance(payload),
-            _ => None,
-        }
-    }
-
     /// The same for a message that names this frame, or none; nothing of one that names another.
     ///
     /// # Errors

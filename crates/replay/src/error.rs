@@ -2,7 +2,7 @@
 //! helps ([`Diagnostic`]). Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use crate::address::Address;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{fmt, io};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::SpoolError;
@@ -156,6 +156,11 @@ impl Error {
     #[inline(never)]
     pub fn usage(what: impl Into<Diagnostic>) -> Error {
         Error::Usage(what.into())
+    }
+
+    /// Error for what cannot be read of this file.
+    pub(crate) fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> Error {
+        strapd_recording::Error::unsupported(path, what).into()
     }
 
     /// A failed write to something that has a name but no path; a closed pipe is told apart.

@@ -15,12 +15,24 @@ pub(crate) mod imu;
 mod read;
 
 use super::registers::{Form, Registers};
-use super::{Decoded, MAX_BATCH, Undecodable};
+use super::{Decoded, Decoder, MAX_BATCH, Undecodable};
 use read::{Read, bytes_of};
 use strapd_attitude::record::{Nanos, RawSample};
 
 /// Bytes after the last field that are still padding: writers round up to 4 or 8.
 const MAX_PADDING: usize = 7;
+
+impl Decoder {
+    /// Returns the covariance of the orientation that a payload states, about the axes of its world, rad^2, row by row;
+    /// `None` of messages other than `sensor_msgs/Imu`, and where the payload is cut.
+    #[must_use]
+    pub fn orientation_covariance(&self, payload: &[u8]) -> Option<[f64; 9]> {
+        match &self.plan {
+            super::Plan::Ros(plan) if plan.imu => imu::orientation_covariance(payload, plan.cdr),
+            _ => None,
+        }
+    }
+}
 
 /// A message type as steps over its bytes.
 #[derive(Debug, Clone, Default)]
@@ -151,12 +163,6 @@ impl Plan {
             out.truncate(before);
         }
         result
-    }
-
-    /// Returns the covariance of the orientation in an Imu, as in [`super::Decoder::orientation_covariance`].
-    pub(crate) fn orientation_covariance(&self, payload: &[u8]) -> Option<[f64; 9]> {
-        self.imu
-            .then(|| imu::orientation_covariance(payload, self.cdr))?
     }
 
     /// The same plan, on the short way where its layout has one.

@@ -24,44 +24,21 @@ pub(super) type Key = (String, bool);
 
 /// Content of a line, of the sensor of this place in the order of appearance.
 #[derive(Debug)]
-pub(super) enum LineEvent<'s> {
+pub(super) enum LineEvent<'s, R> {
     /// A sensor that is new, and its first line.
-    Met(&'s Key, &'s Line),
+    Met(&'s Key, &'s Line, &'s Lines<R>),
     /// Samples whose stamps are known by now; more may still wait.
     Samples(usize, &'s [RawSample]),
     /// Number of a line that holds none, behind one of this sensor.
     Undecodable(usize, u64, Undecodable),
-}
-
-/// Receiver of what lines hold.
-pub(super) trait LineTaker<R> {
-    /// Reason to stop reading.
-    type Error: From<Error>;
-
-    /// Returns the sensor whose samples a line holds; `None` passes the line over.
-    fn sensor_of(
-        &mut self,
-        line: &mut Line,
-        samples: &[RawSample],
-        lines: &Lines<R>,
-    ) -> Result<Option<Key>, Self::Error>;
-
-    /// Takes what comes next; whether more is wanted.
-    fn take(&mut self, event: LineEvent<'_>) -> Result<ControlFlow<()>, Self::Error>;
-
-    /// Notes a line with nothing but forces or fields, of a sensor that is still to come.
-    fn hold(&mut self, _: &Lines<R>) -> Result<(), Self::Error> {
-        Ok(())
-    }
-
-    /// Notes the end of a line; whether more are wanted.
-    fn line_over(&mut self, _: &Lines<R>, _: &Sensors) -> Result<ControlFlow<()>, Self::Error> {
-        Ok(ControlFlow::Continue(()))
-    }
+    /// A line with nothing but forces or fields, of a sensor that is still to come.
+    Held(&'s Lines<R>),
+    /// The end of a line.
+    LineOver(&'s Lines<R>, &'s Sensors),
 }
 
 /// The sensors met so far, each with its samples whose stamps are not known yet.
-#[derive(Default)]
+#[derive(Default, Debug)]
 pub(super) struct Sensors {
     places: BTreeMap<Key, usize>,
     pub(super) bare: Vec<BareStamps>,
@@ -99,15 +76,17 @@ impl Sensors {
     }
 }
 
-/// Reads a text to its end, or until `taker` has enough.
+/// Reads a text to its end, or until `take` has enough. `sensor_of` says whose samples a line holds; `None` passes the
+/// line over.
 ///
 /// # Errors
-/// It cannot be read, or begins with no line of samples; the unit of stamps is not clear; as `taker`.
-pub(super) fn read<R: Read, T: LineTaker<R>>(
+/// It cannot be read, or begins with no line of samples; the unit of stamps is not clear; as `sensor_of` and `take`.
+pub(super) fn read<R: Read, E: From<Error>>(
     lines: &mut Lines<R>,
     path: &Path,
-    taker: &mut T,
-) -> Result<Sensors, T::Error> {
+    mut sensor_of: impl FnMut(&mut Line, &[RawSample], &Lines<R>) -> Result<Option<Key>, E>,
+    mut take: impl FnMut(LineEvent<'_, R>) -> Result<ControlFlow<()>, E>,
+) -> Result<Sensors, E> {
     let mut sensors = Sensors::default();
     let (mut samples, mut known) = (Vec::new(), Vec::new());
     let mut before = None;
@@ -135,17 +114,16 @@ pub(super) fn read<R: Read, T: LineTaker<R>>(
                     }
                     None => {
                         early_besides.hold(line, &mut samples);
-                        taker.hold(lines)?;
-                        None
+                        Some(LineEvent::Held(lines))
                     }
                 }
             }
             (Ok(mut line), _) => {
-                let key = taker.sensor_of(&mut line, &samples, lines)?;
+                let key = sensor_of(&mut line, &samples, lines)?;
                 let place = key.as_ref().and_then(|key| sensors.place_of(key));
                 if let Some((key, place)) = key.zip(place) {
                     if place == sensors.bare.len() {
-                        if taker.take(LineEvent::Met(&key, &line))?.is_break() {
+                        if take(LineEvent::Met(&key, &line, lines))?.is_break() {
                             return Ok(sensors);
                         }
                         let mut bare = BareStamps::default();
@@ -158,7 +136,7 @@ pub(super) fn read<R: Read, T: LineTaker<R>>(
                     before = Some(place);
                     for (number, why) in early.drain(..) {
                         let lost = LineEvent::Undecodable(place, number, why);
-                        if taker.take(lost)?.is_break() {
+                        if take(lost)?.is_break() {
                             return Ok(sensors);
                         }
                     }
@@ -172,11 +150,11 @@ pub(super) fn read<R: Read, T: LineTaker<R>>(
             }
         };
         if let Some(event) = of_line
-            && taker.take(event)?.is_break()
+            && take(event)?.is_break()
         {
             return Ok(sensors);
         }
-        if taker.line_over(lines, &sensors)?.is_break() {
+        if take(LineEvent::LineOver(lines, &sensors))?.is_break() {
             return Ok(sensors);
         }
     }
@@ -189,7 +167,7 @@ pub(super) fn read<R: Read, T: LineTaker<R>>(
         };
         let last = bare.settle().map_err(|what| unclear(path, &what))?;
         let last: Vec<RawSample> = last.collect();
-        if !last.is_empty() && taker.take(LineEvent::Samples(*place, &last))?.is_break() {
+        if !last.is_empty() && take(LineEvent::Samples(*place, &last))?.is_break() {
             break;
         }
     }

@@ -4,7 +4,8 @@
 //! that is done with them, and so each row is read once, and whoever walks the log again gets what was kept of it,
 //! every number with its bits.
 
-use super::line_reader::LineEvent;
+use super::input;
+use super::line_reader;
 use crate::decode::Undecodable;
 use crate::error::Error;
 use crate::records::Bytes;
@@ -13,6 +14,9 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 use strapd_attitude::record::{Nanos, RawSample};
 use tempfile::SpooledTempFile;
+
+/// Content of a line of a text that is read again.
+type LineEvent<'s> = line_reader::LineEvent<'s, input::Bytes>;
 
 /// Bytes in memory, about a million samples; all of a longer text are in a file.
 pub(super) const IN_MEMORY: u64 = 64 << 20;
@@ -62,8 +66,7 @@ impl CacheWriter {
             self.event.extend(place.to_le_bytes());
         };
         match event {
-            LineEvent::Met(..) | LineEvent::Samples(_, []) => return,
-            LineEvent::Samples(at, samples) => {
+            LineEvent::Samples(at, samples) if !samples.is_empty() => {
                 place(at);
                 samples.iter().for_each(|raw| put(raw, &mut self.event));
             }
@@ -71,6 +74,7 @@ impl CacheWriter {
                 place(at);
                 self.lost.push((number, why));
             }
+            _ => return,
         }
         let room = self.room.checked_sub((LENGTH + self.event.len()) as u64);
         let length = u32::try_from(self.event.len());
@@ -319,11 +323,11 @@ mod tests {
                             places.push(place);
                             back.extend_from_slice(some);
                         }
-                        LineEvent::Met(..) => unreachable!(),
                         LineEvent::Undecodable(place, number, why) => {
                             assert_eq!((place as u64, why), (number, lost(number)));
                             bad.push((place, places.len()));
                         }
+                        _ => unreachable!(),
                     }
                     Ok(ControlFlow::Continue(()))
                 });

@@ -3,14 +3,15 @@
 //! Apart from the log in a text because nothing is read twice: of a stream the first sensor is the one that is meant,
 //! and what is known goes on before the next line is waited for.
 
+use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
 use super::line_input::{are_judged, described};
-use super::line_reader::{self, Key, LineEvent, LineTaker, Sensors};
+use super::line_reader::{self, Key, LineEvent, Sensors};
 use super::log_channel::nanos;
 use super::payload_type::PayloadType;
 use super::selection::Selection;
 use crate::attitude_line::TRUTH_ID;
-use crate::decode::{Class, Line};
+use crate::decode::{Class, Line, Options};
 use crate::delimited::Table;
 use crate::error::Error;
 use crate::format::Format;
@@ -45,102 +46,112 @@ pub struct Sensor {
     pub doubt: Option<String>,
 }
 
-impl Sensor {
-    fn of(id: &str, lines: &Lines<impl Read>, declared: Declared) -> Sensor {
-        Sensor {
-            name: if id.is_empty() { "imu" } else { id }.to_owned(),
-            described: described(lines),
-            declared,
-            notes: lines.notes(),
-            doubt: lines.table().and_then(Table::doubt_of_unit),
-        }
-    }
-}
-
-/// Receiver of the samples of one sensor.
-pub trait SensorTaker {
-    /// Reason to stop reading.
-    type Error: From<Error>;
-
-    /// The sensor is known.
-    ///
-    /// # Errors
-    /// It is not taken.
-    fn meet(&mut self, sensor: Sensor) -> Result<(), Self::Error>;
-    /// The next items, to be taken out of the vector; whether more are wanted.
-    ///
-    /// # Errors
-    /// They cannot be taken.
-    fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>, Self::Error>;
-    /// The next line may be long in coming.
-    ///
-    /// # Errors
-    /// What waits cannot be handed on.
-    fn pause(&mut self) -> Result<(), Self::Error>;
+/// Next of what is read of one sensor.
+#[derive(Debug)]
+pub enum SensorEvent<'i> {
+    /// The sensor, before all its items.
+    Met(Sensor),
+    /// Items, to be taken out of the vector.
+    Items(&'i mut Vec<Item>),
+    /// Nothing, perhaps for long.
+    Pause,
 }
 
 /// Reads lines to their end, or until nobody wants them.
 ///
 /// # Errors
 /// They cannot be read; no samples, or without stamps where `clock` wants any; several sensors and none selected; as
-/// `taker`.
-pub fn read<T: SensorTaker>(
+/// `take`, which says whether more are wanted.
+pub fn read<E: From<Error>>(
     (selection, clock): (&Selection, Clock),
     mut lines: Lines<impl Read>,
     path: &Path,
-    taker: &mut T,
-) -> Result<(), T::Error> {
+    mut take: impl FnMut(SensorEvent<'_>) -> Result<ControlFlow<()>, E>,
+) -> Result<(), E> {
     let format = lines.format();
     let is_judged = clock == Clock::Header && are_judged(&lines, &selection.decode);
-    let mut one = OneSensor {
+    let mut choice = SensorChoice {
         selection,
-        clock,
         path,
-        taker,
-        is_judged,
         id: None,
         has_rates: false,
-        items: Vec::with_capacity(BATCH),
     };
-    let sensors = line_reader::read(&mut lines, path, &mut one)?;
-    let Some(bare) = sensors.bare.first() else {
+    let (mut is_met, mut items) = (false, Vec::with_capacity(BATCH));
+    let of_line = |event: LineEvent<'_, _>| -> Result<_, E> {
+        match event {
+            LineEvent::Met((id, _), line, lines) => {
+                is_met = true;
+                let sensor = sensor(id, line, lines, &selection.decode);
+                let is_placed = matches!(clock, Clock::Index { .. })
+                    || lines.table().is_none_or(Table::has_stamps);
+                if !is_placed {
+                    return Err(unplaced(path, lines).into());
+                }
+                return take(SensorEvent::Met(sensor));
+            }
+            LineEvent::Samples(_, samples) => {
+                items.extend(samples.iter().map(|raw| Item::Sample(0, *raw)));
+            }
+            LineEvent::Undecodable(_, number, why) => {
+                items.push(Item::Undecodable(0, Box::new((nanos(number), why))));
+            }
+            LineEvent::Held(lines) if !is_met => has_patience(path, lines)?,
+            LineEvent::LineOver(lines, sensors) if is_met => {
+                if is_judged && steps_of(sensors) == STEPS {
+                    sensors.check_nanos(path, format)?;
+                }
+                // With nothing left in the buffer the next line may be long in coming: what is known goes out first.
+                let may_wait = lines.may_wait();
+                if may_wait || items.len() >= BATCH {
+                    let flow = take(SensorEvent::Items(&mut items))?;
+                    if may_wait {
+                        let _ = take(SensorEvent::Pause)?;
+                    }
+                    return Ok(flow);
+                }
+            }
+            LineEvent::Held(_) | LineEvent::LineOver(..) => {}
+        }
+        Ok(ControlFlow::Continue(()))
+    };
+    let sensor_of = |line: &mut Line, samples: &[RawSample], lines: &Lines<_>| {
+        let found = choice.sensor_of(line, samples, lines);
+        found.map_err(E::from)
+    };
+    let sensors = line_reader::read(&mut lines, path, sensor_of, of_line)?;
+    if !is_met {
         return Err(nothing(path, format).into());
-    };
-    if one.is_judged && bare.steps() < STEPS {
+    }
+    if is_judged && steps_of(&sensors) < STEPS {
         sensors.check_nanos(path, format)?;
     }
-    let _ = one.taker.take(&mut one.items)?;
+    let _ = take(SensorEvent::Items(&mut items))?;
     Ok(())
 }
 
-/// The one sensor that is taken of a stream.
-struct OneSensor<'r, T> {
+/// The one sensor that is taken of a stream: the one selected, or the first.
+struct SensorChoice<'r> {
     selection: &'r Selection,
-    clock: Clock,
     path: &'r Path,
-    taker: &'r mut T,
-    /// Whether stamps that are nanoseconds by their name are held against their steps.
-    is_judged: bool,
     /// Id of the sensor, once it is known.
     id: Option<String>,
     has_rates: bool,
-    items: Vec<Item>,
 }
 
-impl<R: Read, T: SensorTaker> LineTaker<R> for OneSensor<'_, T> {
-    type Error = T::Error;
-
+impl SensorChoice<'_> {
     fn sensor_of(
         &mut self,
         line: &mut Line,
         samples: &[RawSample],
-        lines: &Lines<R>,
-    ) -> Result<Option<Key>, T::Error> {
+        lines: &Lines<impl Read>,
+    ) -> Result<Option<Key>, Error> {
         // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
         let is_sample = line.class == Class::Rate && !samples.is_empty();
         if !is_sample && samples.iter().all(|s| s.gyro.is_none()) {
             // Attitudes, status and the like between the samples.
-            self.hold(lines)?;
+            if self.id.is_none() {
+                has_patience(self.path, lines)?;
+            }
             return Ok(None);
         }
         let id = line.id.take().unwrap_or_default();
@@ -148,95 +159,51 @@ impl<R: Read, T: SensorTaker> LineTaker<R> for OneSensor<'_, T> {
         // An attitude carries the rate behind it, which makes it a sample where there is
         // nothing else: not beside samples, and not when it is the truth about them.
         let is_truth = id == TRUTH_ID && named != Some(TRUTH_ID);
-        if line.class == Class::Att && (self.has_rates || is_truth) {
-            return Ok(None);
-        }
-        if named.is_some_and(|name| name != "all" && name != id) {
+        let is_passed_over = line.class == Class::Att && (self.has_rates || is_truth);
+        if is_passed_over || named.is_some_and(|name| name != "all" && name != id) {
             return Ok(None);
         }
         self.has_rates |= line.class == Class::Rate;
-        match &self.id {
-            Some(first) if *first != id => Err(Error::Topic {
-                path: self.path.to_owned(),
-                topic: first.clone(),
-                what: Diagnostic::new(format!(
-                    "line {}: samples of another sensor, `{id}`",
-                    lines.number()
-                ))
+        let first = self.id.get_or_insert_with(|| id.clone());
+        if *first == id {
+            return Ok(Some((id, false)));
+        }
+        let number = lines.number();
+        Err(Error::Topic {
+            path: self.path.to_owned(),
+            topic: first.clone(),
+            what: Diagnostic::new(format!("line {number}: samples of another sensor, `{id}`"))
                 .help(format!(
                     "{TOPIC} ID takes one of them, and of a file {TOPIC} all each"
                 )),
-            }
-            .into()),
-            Some(_) => Ok(Some((id, false))),
-            None => {
-                self.meet(&id, line, lines)?;
-                Ok(Some((id, false)))
-            }
-        }
-    }
-
-    fn take(&mut self, event: LineEvent<'_>) -> Result<ControlFlow<()>, T::Error> {
-        match event {
-            LineEvent::Met(..) => {}
-            LineEvent::Samples(_, samples) => {
-                let samples = samples.iter().map(|raw| Item::Sample(0, *raw));
-                self.items.extend(samples);
-            }
-            LineEvent::Undecodable(_, number, why) => {
-                let lost = Item::Undecodable(0, Box::new((nanos(number), why)));
-                self.items.push(lost);
-            }
-        }
-        Ok(ControlFlow::Continue(()))
-    }
-
-    fn hold(&mut self, lines: &Lines<R>) -> Result<(), T::Error> {
-        match &self.id {
-            None if lines.number() > PATIENCE => Err(nothing(self.path, lines.format()).into()),
-            _ => Ok(()),
-        }
-    }
-
-    fn line_over(
-        &mut self,
-        lines: &Lines<R>,
-        sensors: &Sensors,
-    ) -> Result<ControlFlow<()>, T::Error> {
-        let Some(bare) = sensors.bare.first() else {
-            return Ok(ControlFlow::Continue(()));
-        };
-        if self.is_judged && bare.steps() == STEPS {
-            sensors.check_nanos(self.path, lines.format())?;
-        }
-        // With nothing left in the buffer the next line may be long in coming: what is known goes
-        // out first.
-        let may_wait = lines.may_wait();
-        let mut flow = ControlFlow::Continue(());
-        if self.items.len() >= BATCH || may_wait {
-            flow = self.taker.take(&mut self.items)?;
-        }
-        if may_wait {
-            self.taker.pause()?;
-        }
-        Ok(flow)
+        })
     }
 }
 
-impl<T: SensorTaker> OneSensor<'_, T> {
-    fn meet(&mut self, id: &str, line: &Line, lines: &Lines<impl Read>) -> Result<(), T::Error> {
-        let declared = Declared {
+fn sensor(id: &str, line: &Line, lines: &Lines<impl Read>, options: &Options) -> Sensor {
+    Sensor {
+        name: if id.is_empty() { "imu" } else { id }.to_owned(),
+        described: described(lines),
+        declared: Declared {
             sample_kind: line.sample_kind,
             gyro_unit: line.gyro_unit,
-            interval_unit_given: self.selection.decode.states_interval_unit(),
+            interval_unit_given: options.states_interval_unit(),
             ..lines.declared()
-        };
-        let has_stamps = lines.table().is_none_or(Table::has_stamps);
-        if !has_stamps && !matches!(self.clock, Clock::Index { .. }) {
-            return Err(unplaced(self.path, lines).into());
-        }
-        self.id = Some(id.to_owned());
-        self.taker.meet(Sensor::of(id, lines, declared))
+        },
+        notes: lines.notes(),
+        doubt: lines.table().and_then(Table::doubt_of_unit),
+    }
+}
+
+fn steps_of(sensors: &Sensors) -> u64 {
+    sensors.bare.first().map_or(0, BareStamps::steps)
+}
+
+/// Whether a text without any sample so far may still be one of samples.
+fn has_patience(path: &Path, lines: &Lines<impl Read>) -> Result<(), Error> {
+    match lines.number() > PATIENCE {
+        true => Err(nothing(path, lines.format())),
+        false => Ok(()),
     }
 }
 

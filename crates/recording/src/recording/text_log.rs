@@ -7,7 +7,7 @@
 use super::channel_route::{Item, Route};
 use super::input::{Bytes, Input};
 use super::line_input::{are_judged, described};
-use super::line_reader::{Key, LineEvent, LineTaker, MOST_SENSORS, read};
+use super::line_reader::{Key, LineEvent, MOST_SENSORS, read};
 use super::log_channel::LogChannel;
 use super::sample_cache::{CacheWriter, SampleCache};
 use crate::attitude_line::TRUTH_ID;
@@ -46,33 +46,16 @@ struct Met {
     times: Option<(u64, u64)>,
 }
 
-/// Receiver of what a text holds, of all its sensors.
-struct AllSensors<T>(T);
-
-impl<E: From<Error>, T> LineTaker<Bytes> for AllSensors<T>
-where
-    T: FnMut(LineEvent<'_>) -> std::result::Result<ControlFlow<()>, E>,
-{
-    type Error = E;
-
-    /// Returns the sensor of a line, whose attitudes are another one; `None` of status and the like between samples.
-    fn sensor_of(
-        &mut self,
-        line: &mut Line,
-        samples: &[RawSample],
-        _: &Lines<Bytes>,
-    ) -> std::result::Result<Option<Key>, E> {
-        let says_something = |s: &RawSample| s.gyro.is_some() || s.orientation.is_some();
-        if line.class != Class::Rate && !samples.iter().any(says_something) {
-            return Ok(None);
-        }
-        let is_attitude = line.class == Class::Att;
-        Ok(Some((line.id.take().unwrap_or_default(), is_attitude)))
-    }
-
-    fn take(&mut self, event: LineEvent<'_>) -> std::result::Result<ControlFlow<()>, E> {
-        (self.0)(event)
-    }
+/// Returns the sensor of a line, whose attitudes are another one; `None` of status and the like between samples.
+fn sensor_of<E>(
+    line: &mut Line,
+    samples: &[RawSample],
+    _: &Lines<Bytes>,
+) -> std::result::Result<Option<Key>, E> {
+    let says_something = |s: &RawSample| s.gyro.is_some() || s.orientation.is_some();
+    let is_sample = line.class == Class::Rate || samples.iter().any(says_something);
+    let is_attitude = line.class == Class::Att;
+    Ok(is_sample.then(|| (line.id.take().unwrap_or_default(), is_attitude)))
 }
 
 impl TextLog {
@@ -96,9 +79,9 @@ impl TextLog {
                 .say(&format!("{}: {note}", input.name().display()));
         }
         let (mut met, mut cache) = (Vec::<(Key, Met)>::new(), CacheWriter::new(kept));
-        let mut all = AllSensors(|event: LineEvent<'_>| -> Result<_> {
+        let take = |event: LineEvent<'_, Bytes>| -> Result<_> {
             match &event {
-                LineEvent::Met(key, line) => {
+                LineEvent::Met(key, line, _) => {
                     let first = Met::new(line, options, &declared, &description);
                     met.push(((*key).clone(), first));
                 }
@@ -107,12 +90,12 @@ impl TextLog {
                         met.take(samples);
                     }
                 }
-                LineEvent::Undecodable(..) => {}
+                _ => {}
             }
             cache.push(event);
             Ok(ControlFlow::Continue(()))
-        });
-        let sensors = read(&mut lines, input.name(), &mut all)?;
+        };
+        let sensors = read(&mut lines, input.name(), sensor_of, take)?;
         if are_judged(&lines, options) {
             sensors.check_nanos(input.name(), lines.format())?;
         }
@@ -173,10 +156,9 @@ impl TextLog {
         let routes: Vec<Option<Route>> = self.channels.iter().map(&mut select).collect();
         let mut items = Vec::with_capacity(BATCH);
         let mut is_over = false;
-        let mut each = |event: LineEvent<'_>| -> std::result::Result<_, E> {
+        let mut each = |event: LineEvent<'_, Bytes>| -> std::result::Result<_, E> {
             let route = |place: usize| routes.get(place).and_then(Option::as_ref);
             match event {
-                LineEvent::Met(..) => {}
                 LineEvent::Samples(place, samples) => {
                     if let Some(route) = route(place) {
                         route.pass(samples, &mut items);
@@ -187,6 +169,7 @@ impl TextLog {
                         route.lose(number, why, &mut items);
                     }
                 }
+                _ => {}
             }
             if items.len() < BATCH {
                 return Ok(ControlFlow::Continue(()));
@@ -201,7 +184,7 @@ impl TextLog {
             Some(walked) => walked?,
             None => {
                 let mut lines = self.input.lines(&self.options)?;
-                read(&mut lines, self.input.name(), &mut AllSensors(each))?;
+                read(&mut lines, self.input.name(), sensor_of, each)?;
             }
         }
         if !is_over && !items.is_empty() {

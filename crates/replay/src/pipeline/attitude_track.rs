@@ -2,7 +2,6 @@
 //!
 //! Attitudes in NDJSON and CSV are our own outputs; all else goes through the same walk and decoders as a replay.
 
-use super::request::unsupported;
 use super::simulate::TRUTH_TOPIC;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
@@ -110,7 +109,7 @@ fn from_log(
     let known = attitude_channel(path, &log, side, topic)?;
     let decoder = known
         .decoder(&mut Decoders::default())
-        .map_err(|why| unsupported(path, &why))?;
+        .map_err(|why| Error::unsupported(path, &why))?;
     let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
     let (mut resets, mut cuts) = (None, Vec::new());
@@ -235,7 +234,7 @@ fn attitude_channel<'l>(
         [] => {
             let holds = topics::listing(&log.candidates());
             let what = format!("holds no attitude; it holds:{holds}");
-            Err(unsupported(path, what))
+            Err(Error::unsupported(path, what))
         }
         [(best, known), rest @ ..] if rest.first().is_none_or(|(next, _)| next < best) => Ok(known),
         several => {
@@ -243,7 +242,7 @@ fn attitude_channel<'l>(
             let list = topics::listing(&list);
             let what = Diagnostic::new(format!("several topics carry an attitude:{list}"))
                 .help(format!("{TOPIC} NAME (or {REF_TOPIC} NAME) takes one"));
-            Err(unsupported(path, what))
+            Err(Error::unsupported(path, what))
         }
     }
 }
@@ -381,7 +380,7 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
     let refuse = |what: String| {
         let what = Diagnostic::new(what).help("columns stamp_ns,qw,qx,qy,qz are needed");
-        unsupported(path, what)
+        Error::unsupported(path, what)
     };
     let mut track = Vec::new();
     for row in csv::Reader::from_reader(BufReader::new(input.text(&Options::default())?))
@@ -404,5 +403,5 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {
-    unsupported(path, format!("line {number}: {what}"))
+    Error::unsupported(path, format!("line {number}: {what}"))
 }

@@ -3,7 +3,7 @@
 //! Apart from the replay because it is all choice and no work: which topics, under which names, held
 //! against which reference.
 
-use super::request::{ReplayRequest, unsupported};
+use super::request::ReplayRequest;
 use super::session::Found;
 use crate::error::{Error, Result};
 use crate::sink::{Stream, output_topic};
@@ -221,7 +221,7 @@ pub(super) fn reference(
     };
     let decoder = found
         .decoder(&mut Decoders::default())
-        .map_err(|why| unsupported(path, &why))?;
+        .map_err(|why| Error::unsupported(path, &why))?;
     Ok(Some(Reference {
         channel: found.channel.clone(),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),

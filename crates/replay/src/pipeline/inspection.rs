@@ -2,7 +2,6 @@
 //!
 //! Apart from the replay because it integrates nothing: `info`, `check` and `report` look before anyone leaps.
 
-use super::request;
 use crate::error::{Error, Result};
 use crate::inspection::{Aids, Inspection};
 use std::ops::ControlFlow;
@@ -181,7 +180,7 @@ pub(crate) fn look_as(
 ) -> Result<Looks> {
     let path = log.name();
     let (wanted, left_out) = wanted(log, named);
-    let unsupported = |what: Diagnostic| request::unsupported(path, what);
+    let unsupported = |what: Diagnostic| Error::unsupported(path, what);
     let mut decoders = Decoders::of_run(plan, options);
     let (mut looks, mut plans): (Vec<Look>, Vec<TopicPlan<'_>>) = Default::default();
     for (source, is_named) in wanted {

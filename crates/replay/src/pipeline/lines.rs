@@ -6,23 +6,21 @@ use super::replay_start::StreamStart;
 use super::request::ReplayRequest;
 use super::session::Found;
 use super::summarise;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::sink::{Flow, Stream, output_topic};
 use crate::summary::RunSummary;
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_recording::MadeBefore;
-use strapd_recording::Selection;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
-use strapd_recording::recording::channel_route::Item;
-use strapd_recording::recording::sensor_lines::{Sensor, SensorTaker, read};
+use strapd_recording::recording::sensor_lines::{Sensor, SensorEvent, read};
 
 /// Replays lines; `prepared` is what [`prepare`] found, of those that can be read twice.
 ///
@@ -36,15 +34,9 @@ pub(super) fn replay(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let path = run.source.name();
-    let mut running = Running {
-        run,
-        made_before: MadeBefore::in_lines(&input),
-        start: StreamStart::new(run, &path, prepared),
-        pool,
-        watch,
-    };
-    read(wanted(run), input, &path, &mut running)?;
-    let ended = running.start.into_session(pool)?.finish(run, pool)?;
+    let mut start = StreamStart::new(run, &path, prepared);
+    read_into(&mut start, run, &path, input, pool, watch)?;
+    let ended = start.into_session(pool)?.finish(run, pool)?;
     Ok(summarise::run(run, ended, &Survey::default()))
 }
 
@@ -58,56 +50,40 @@ pub(super) fn prepare(
     pool: &Pool,
 ) -> Result<Option<Prepared>> {
     let path = run.source.name();
-    let mut looking = Running {
-        run,
-        made_before: None,
-        start: StreamStart::look(run, &path),
-        pool,
-        watch: &mut |_| {},
-    };
-    read(wanted(run), input, &path, &mut looking)?;
-    looking.start.into_prepared()
+    let mut look = StreamStart::look(run, &path);
+    read_into(&mut look, run, &path, input, pool, &mut |_| {})?;
+    look.into_prepared()
 }
 
-/// A run, or the look before it.
-struct Running<'r, 'w> {
-    run: &'r ReplayRequest,
-    /// Origin of attitudes that are no recording.
-    made_before: Option<MadeBefore>,
-    start: StreamStart<'r>,
-    pool: &'r Pool,
-    watch: &'w mut dyn FnMut(&Position),
-}
-
-impl SensorTaker for Running<'_, '_> {
-    type Error = Error;
-
-    fn meet(&mut self, sensor: Sensor) -> Result<()> {
-        let (mut found, stream) = met(self.run, sensor);
-        if self.run.selection.topic.is_none()
-            && let Some(made) = &self.made_before
-        {
-            found.warnings.push(integrated_again(made));
+fn read_into(
+    start: &mut StreamStart<'_>,
+    run: &ReplayRequest,
+    path: &Path,
+    input: Lines<impl Read>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<()> {
+    let made_before = MadeBefore::in_lines(&input);
+    let made_before = made_before.filter(|_| run.selection.topic.is_none());
+    read((&run.selection, run.plan.clock), input, path, |event| {
+        match event {
+            SensorEvent::Met(sensor) => {
+                let (mut found, stream) = met(run, sensor);
+                let again = made_before.as_ref().map(integrated_again);
+                found.warnings.extend(again);
+                start.meet(found, stream)?;
+            }
+            SensorEvent::Items(items) => {
+                let flow = start.consume(items.drain(..), pool)?;
+                watch(&start.position());
+                if flow == Flow::Closed {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+            SensorEvent::Pause => start.flush_to_readers(pool)?,
         }
-        self.start.meet(found, stream)
-    }
-
-    fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>> {
-        let flow = self.start.consume(items.drain(..), self.pool)?;
-        (self.watch)(&self.start.position());
-        Ok(match flow {
-            Flow::Continue => ControlFlow::Continue(()),
-            Flow::Closed => ControlFlow::Break(()),
-        })
-    }
-
-    fn pause(&mut self) -> Result<()> {
-        self.start.flush_to_readers(self.pool)
-    }
-}
-
-fn wanted(run: &ReplayRequest) -> (&Selection, Clock) {
-    (&run.selection, run.plan.clock)
+        Ok(ControlFlow::Continue(()))
+    })
 }
 
 fn met(run: &ReplayRequest, sensor: Sensor) -> (Found, Stream) {

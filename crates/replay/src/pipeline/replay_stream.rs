@@ -6,7 +6,7 @@
 use super::channel_choice::which_stamp;
 use super::position::Position;
 use super::replay_start::StreamStart;
-use super::request::{ReplayRequest, unsupported};
+use super::request::ReplayRequest;
 use super::session::Found;
 use super::summarise;
 use crate::error::{Error, Result};
@@ -251,7 +251,7 @@ impl Picked {
                 (Item::Copy(copied), Some(held)) => {
                     let was_waiting = held.is_waiting();
                     held.take(*copied, &self.decoders, items)
-                        .map_err(|why| unsupported(path, &why))?;
+                        .map_err(|why| Error::unsupported(path, &why))?;
                     if was_waiting && !held.is_waiting() {
                         let (channel, decoder) = held.known();
                         self.meet(run, &channel, &decoder);
@@ -268,7 +268,7 @@ impl Picked {
         for mut held in std::mem::take(&mut self.held) {
             if held.is_waiting() {
                 held.release(&self.decoders, items)
-                    .map_err(|why| unsupported(path, &why))?;
+                    .map_err(|why| Error::unsupported(path, &why))?;
                 let (channel, decoder) = held.known();
                 self.meet(run, &channel, &decoder);
             }
@@ -296,7 +296,7 @@ impl Picked {
     /// Why nothing was picked.
     fn nothing(self, run: &ReplayRequest, path: &Path, survey: &Survey) -> Error {
         if let Some(what) = self.refusals.into_iter().next() {
-            return unsupported(path, what);
+            return Error::unsupported(path, what);
         }
         let mut decoders = Decoders::default();
         let channels: Vec<LogChannel> = survey

@@ -66,11 +66,6 @@ impl ReplayRequest {
     }
 }
 
-/// A recording that is not read, or not so.
-pub(super) fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> error::Error {
-    Error::unsupported(path, what).into()
-}
-
 /// A topic that cannot be run, in the words of the stage that refused it.
 pub(super) fn refused(path: &Path, topic: &str, what: Diagnostic) -> error::Error {
     Error::Topic {
