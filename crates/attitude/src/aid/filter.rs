@@ -243,13 +243,22 @@ impl Filter {
     #[must_use]
     pub fn is_bias_unobserved(&self) -> bool {
         let (main, withheld) = self.state.vertical.withheld();
-        let (now, first) = (self.calibration_covariance().0, &self.settings);
-        let prior = match &first.prior.bias {
-            Some(known) => main.dot(&(known * main)),
-            None => first.bias_prior.powi(2),
-        };
         // Half of the prior's sigma.
-        withheld > 0.5 && main.dot(&(now * main)) > 0.25 * COLOURED * prior
+        withheld > 0.5 && self.variance_of_bias(main) > 0.25 * self.prior_of_bias(main)
+    }
+
+    /// Variance of the gyro's bias along a unit vector of the body, (rad/s)^2.
+    pub(super) fn variance_of_bias(&self, axis: &Vector3<f64>) -> f64 {
+        let bias = Matrix3::from_fn(|i, j| self.state.covariance.between(BIAS + i, BIAS + j));
+        axis.dot(&(bias * axis))
+    }
+
+    /// The same at the start.
+    pub(super) fn prior_of_bias(&self, axis: &Vector3<f64>) -> f64 {
+        match &self.settings.prior.bias {
+            Some(known) => axis.dot(&(known * axis)),
+            None => self.settings.bias_prior.powi(2),
+        }
     }
 
     /// Whether a magnetometer is to tell the heading.

@@ -1,6 +1,7 @@
 //! Rate and force -> whether the sensor is at rest, and what its gyro reads there. Pure.
 
 use super::settings::Settings;
+use crate::condition::stillness::Swing;
 use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -27,6 +28,11 @@ pub(super) struct Rest {
     /// Whether an interval of this spell has been taken for rest.
     #[cfg_attr(feature = "serde", serde(default))]
     is_certain: bool,
+    /// The force at the last interval of the spell, and how it has moved in it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    last_force: Option<Vector3<f64>>,
+    #[cfg_attr(feature = "serde", serde(default))]
+    swing: Swing,
 }
 
 /// The gyro's reading of a rest.
@@ -84,19 +90,28 @@ impl Rest {
     fn forget(&mut self) {
         self.open.clear();
         self.is_certain = false;
+        self.last_force = None;
+        self.swing = Swing::default();
     }
 
-    /// Takes the mean rate over an interval. Returns what the gyro reads at rest, once the body has rested on for long
+    /// Takes the mean rate over an interval, and what of it is not known to be bias. Returns what the gyro reads at rest, once the body has rested on for long
     /// enough since: the mean of the whole spell the first time, then of one interval each.
     pub(super) fn take_interval(
         &mut self,
-        mean: Vector3<f64>,
+        (mean, off): (Vector3<f64>, Vector3<f64>),
         secs: f64,
         is_at_rest: bool,
         settings: &Settings,
     ) -> Option<RestRate> {
         if self.quiet < secs {
             self.forget();
+            return None;
+        }
+        if let Some(last) = self.last_force.replace(self.force) {
+            self.swing.take([&last, &self.force], &off, secs);
+        }
+        if self.swing.is_turn() {
+            self.interrupt();
             return None;
         }
         if self.open.len() >= MOST {
@@ -142,6 +157,8 @@ impl Rest {
             });
         }
         self.is_certain = true;
+        // What the gyro reads beside its bias is another from here on.
+        self.swing = Swing::default();
         Some(RestRate {
             mean: whole,
             variance: one / count,
@@ -174,6 +191,8 @@ impl Rest {
             && are_numbers(&self.rate)
             && are_numbers(&self.force)
             && is_amount(self.quiet)
+            && self.last_force.as_ref().is_none_or(are_numbers)
+            && self.swing.is_plausible()
             && self
                 .open
                 .iter()

@@ -9,6 +9,7 @@ use super::filter::{COLOURED, Filter, Innovation};
 use super::gravity::Force;
 use super::interval::Interval;
 use super::start::{POSITION_START, VELOCITY_START};
+use crate::condition::stillness::{BEYOND_CLASS, about_vertical};
 use crate::frames::Nav;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::AttitudeCovariance;
@@ -53,9 +54,20 @@ impl Filter {
         // What the gyro reads of a world that turns is no bias.
         let of_world = self.state.interval.attitude.transpose() * self.world_rate;
         let mean = (self.state.interval.rate - of_world) / secs;
+        let up = self.state.interval.attitude.row(2).transpose();
+        let off = mean - self.state.calibration.bias;
+        let is_turn = about_vertical(&off, &up).is_some_and(|turn| {
+            let up = up.normalize();
+            let now = self.variance_of_bias(&up);
+            turn * turn > BEYOND_CLASS * BEYOND_CLASS * now.max(self.prior_of_bias(&up))
+        });
         let is_at_rest = self.rests();
         let rest = &mut self.state.rest;
-        let Some(rate) = rest.take_interval(mean, secs, is_at_rest, &self.settings) else {
+        if is_turn {
+            rest.interrupt();
+            return;
+        }
+        let Some(rate) = rest.take_interval((mean, off), secs, is_at_rest, &self.settings) else {
             return;
         };
         for axis in 0..3 {

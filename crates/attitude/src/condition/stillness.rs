@@ -5,12 +5,17 @@
 //! than no bias.
 //!
 //! A body that turns slowly, steadily and about the vertical cannot be told from a gyro bias by
-//! an IMU; [`Limits::max_mean_rate`] is the only defence.
+//! an IMU; beside [`Limits::max_mean_rate`] there is only what biases are like ([`Rests::less_turns`]). About any
+//! other axis gravity turns with it.
 
 mod estimate;
+mod swing;
+mod turns;
 
 pub(crate) use estimate::rest_at_start;
 pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level};
+pub(crate) use swing::Swing;
+pub(crate) use turns::{ALONG, BEYOND_CLASS, about_vertical};
 
 use crate::frames::{Body, In};
 use crate::quaternion::BodyRate;
@@ -170,6 +175,7 @@ struct Growing {
     accel: Moments,
     last_rate: Vector3<f64>,
     last_accel: Option<Vector3<f64>>,
+    swing: Swing,
     samples: u64,
 }
 
@@ -259,8 +265,13 @@ impl Stillness {
             accel: Moments::default(),
             last_rate: rate,
             last_accel: accel,
+            swing: Swing::default(),
             samples: 0,
         });
+        if let (Some(from), Some(to)) = (&growing.last_accel, &accel) {
+            let secs = window.end.secs_since(growing.end);
+            growing.swing.take([from, to], &rate, secs);
+        }
         growing.end = window.end;
         growing.windows.push(&rate);
         growing.variance += window.gyro.variance() / f64::from(window.gyro.n);
@@ -291,7 +302,7 @@ impl Stillness {
             return;
         };
         let secs = growing.end.secs_since(growing.start);
-        if secs < SLACK * MIN_REST_SECS {
+        if secs < SLACK * MIN_REST_SECS || growing.swing.is_turn() {
             return;
         }
         let n = f64::from(growing.windows.n);

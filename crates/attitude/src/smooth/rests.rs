@@ -5,6 +5,7 @@
 //! and points anywhere; a turn that leaves gravity where it is points along it.
 
 use super::segments::{STILL_MEAN, Segment, median_of, median_rate};
+use crate::condition::stillness::{ALONG, BEYOND_CLASS, about_vertical};
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -16,12 +17,6 @@ const SAME: f64 = 0.002;
 const FEW_SECS: f64 = 10.0;
 /// And these are the short ones, s.
 const SHORT_SECS: f64 = 1.4;
-/// A rate along the force that is above so many times what it is across is one of turning.
-const ALONG: f64 = 3.0;
-/// Least of the rate across, rad/s.
-const ACROSS: f64 = 0.1_f64.to_radians();
-/// However long it lasts, a turn is told from a bias once it is above so many sigmas of the class.
-const BEYOND_CLASS: f64 = 3.0;
 
 /// Segments one after the other that scatter like a body at rest.
 pub(super) struct Run {
@@ -80,8 +75,7 @@ impl Run {
 
     /// Whether it points along gravity, as the rate of a turn does that leaves gravity where it is.
     fn is_along(&self) -> bool {
-        let across = (self.rate - self.up * self.rate.dot(&self.up)).norm();
-        self.along() > ALONG * across.max(ACROSS)
+        about_vertical(&self.rate, &self.up).is_some()
     }
 
     /// Whether two can be the rate of one bias.
