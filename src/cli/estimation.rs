@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Plan, SensorCalibration, Truncation};
+use strapd_attitude::estimate::{Aid, Bias, Plan, SensorCalibration, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 use strapd_recording::Selection;
@@ -166,16 +166,16 @@ pub struct Estimation {
         allow_hyphen_values = true
     )]
     pub init: String,
-    /// Gyro bias in rad/s, body axes: none, auto (from detected rest), or x,y,z
+    /// Gyro bias in rad/s, body axes: none, auto (from detected rest), or x,y,z [default: auto in a file whose
+    /// attitude is aided, if it rests, else none]
     #[arg(
         long,
         value_name = "BIAS",
         value_parser = known_words::bias(),
         hide_possible_values = true,
-        default_value = "none",
         allow_hyphen_values = true
     )]
-    pub bias: String,
+    pub bias: Option<String>,
     /// Calibration of the sensor: a TOML file, as --save-calibration of replay writes it. It is taken
     /// out first, and its sigmas are where the filter begins. serve: or a folder of such files, each for the
     /// sensor it names
@@ -425,7 +425,7 @@ impl Estimation {
                 .transpose()?,
             clock,
             initial: parse_initial(&self.init)?,
-            bias: parse_bias(&self.bias)?,
+            bias: self.bias.as_deref().map_or(Ok(Bias::Unsaid), parse_bias)?,
             max_gap_secs: self.max_gap,
             on_gap: self.on_gap.into(),
             latitude_deg: self.earth_rate,

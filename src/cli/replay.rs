@@ -285,7 +285,7 @@ impl Replay {
         if self.estimation.topic.as_deref() == Some("all") {
             return wrong("a calibration is of one sensor", "--topic NAME");
         }
-        if self.estimation.aid == AidArg::None && self.estimation.bias != "auto" {
+        if self.estimation.aid == AidArg::None && self.estimation.bias.as_deref() != Some("auto") {
             return wrong(
                 "the gyro alone learns nothing",
                 "--aid gravity, or --bias auto for the bias of a rest",

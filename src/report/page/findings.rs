@@ -54,7 +54,7 @@ fn answered(code: &str, plan: &Plan) -> Option<&'static str> {
         "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
         "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),
         "mounted-on-side" => (plan.mount.is_some(), "--mount"),
-        "bias" => (plan.bias != Bias::None, "--bias"),
+        "bias" => (!matches!(plan.bias, Bias::Unsaid | Bias::None), "--bias"),
         "jitter" => (plan.regularise_stamps, "--regularise-stamps"),
         "sample-kind-unknown" => (plan.kind.is_some(), "--sample-kind"),
         _ => (false, ""),

@@ -34,7 +34,7 @@ use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Aid, Bias, Forces, Memory, Plan};
+use strapd_attitude::estimate::{Aid, Forces, Memory, Plan};
 use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
@@ -253,16 +253,8 @@ impl SensorStream {
     /// Calibration of the sensor by now. `plan` is that of [`SensorStream::new`].
     #[must_use]
     pub fn calibration(&self, plan: &Plan) -> SensorCalibration {
-        // What a rest would have told was learned on the way.
-        let plan = Plan {
-            bias: match plan.bias {
-                Bias::Auto => Bias::None,
-                other => other,
-            },
-            ..plan.clone()
-        };
         let filter = self.estimator.filter();
-        let known = learned((&plan, &self.resolved, &self.prepared), filter, None);
+        let known = learned((plan, &self.resolved, &self.prepared), filter, None);
         calibration::described(known, &self.id, "live", self.last.as_ref())
     }
 

@@ -511,3 +511,22 @@ fn what_can_not_be_is_refused_with_the_flag() {
         }
     }
 }
+
+/// A wheeled robot of which gravity does not show the bias about the vertical, against its own orientation; the gyro
+/// alone, its bias taken out after its rest, is 45 degrees off at most.
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
+fn a_wheeled_robot_keeps_the_heading_of_its_gyro_under_a_sigma_that_is_true() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = shared_data::shared("logs/real/husky_ros1_lz4.mcap").unwrap();
+    let log = log.display();
+    strapd(dir.path(), &format!("replay {log} -o husky.mcap")).done();
+    let compare = format!("compare husky.mcap {log} --align first-heading --json");
+    let compared = strapd(dir.path(), &compare).json();
+    let most = compared["heading"]["max_deg"].as_f64().unwrap();
+    let within = compared["sigma"]["heading"]["within_3_sigma"]
+        .as_f64()
+        .unwrap();
+    // 339 degrees and 0.88 before gravity was kept from telling the bias about the vertical.
+    assert!(most <= 45.0 && within >= 0.97, "{most} {within}");
+}

@@ -4,7 +4,8 @@
 //! specific force (phones export acceleration without gravity) would level to anything.
 
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, BIAS_LEFT, Bias, Initial, Noise, Plan};
+use super::plan::{Aid, Initial, Noise, Plan};
+use super::preparation::Prepared;
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
@@ -133,11 +134,32 @@ impl Aiding {
     }
 
     /// The same levelled by the mean force of the first half second instead of that of one sample, where it begins
-    /// level and these samples are known before the first attitude is wanted.
-    pub(super) fn levelled_by_mean(mut self, resolved: &Meaning, first: &[RawSample]) -> Aiding {
-        let is_level = self.start == Start::Level && self.forces == Forces::WithRates;
-        if is_level && let Some((sum, secs)) = force_at_first(resolved, first, LEVELLED_SECS) {
-            let mean = sum * (self.force_scale / secs);
+    /// level and these samples, and forces of their own, are known before the first attitude is wanted.
+    pub(super) fn levelled_by_mean(
+        mut self,
+        resolved: &Meaning,
+        first: &[RawSample],
+        beside: &[RawSample],
+    ) -> Aiding {
+        let stamps = first.first().map(stamp_of);
+        let beside = beside.iter().filter(|raw| Some(stamp_of(raw)) >= stamps);
+        let (beside, scale) = match self.forces {
+            Forces::Beside => {
+                let beside: Vec<RawSample> = beside.copied().collect();
+                let length = beside.first().and_then(|raw| raw.accel);
+                let length = length.map(|force| resolved.force(force).as_vector().norm());
+                let scale = length.map_or(1.0, |length| force_scale(resolved, length));
+                (beside, scale)
+            }
+            _ => (Vec::new(), self.force_scale),
+        };
+        let mut all: Vec<RawSample> = first.iter().copied().chain(beside).collect();
+        all.sort_by_key(stamp_of);
+        let calibrated = |force| *resolved.calibrated_force(force, scale).as_vector();
+        if self.start == Start::Level
+            && let Some((sum, secs)) = force_at_first(resolved, &all, LEVELLED_SECS, calibrated)
+        {
+            let mean = sum / secs;
             // One that is no gravity levels no better than one sample.
             if (0.5..1.5).contains(&(mean.norm() / STANDARD_GRAVITY)) {
                 self.start = Start::LevelBy(In::assume(mean));
@@ -216,10 +238,10 @@ impl Aiding {
         if plan.noise != Plan::default().noise {
             of_class(&mut settings, &plan.noise);
         }
-        if plan.bias != Bias::None {
-            settings.bias_prior = settings.bias_prior.min(BIAS_LEFT);
+        if let Some(left) = plan.bias.left() {
+            settings.bias_prior = settings.bias_prior.min(left);
         }
-        settings.prior = resolved.prior(&settings, plan.bias == Bias::None);
+        settings.prior = resolved.prior(&settings, plan.bias.left().is_none());
         Aiding {
             settings,
             start: start(plan.initial, settings.has_field),
@@ -248,8 +270,8 @@ fn no_gravity(length: f64) -> String {
 impl Aiding {
     /// One standard deviation of what is left of a bias that was said, measured at rest or calibrated, rad/s, body
     /// axes.
-    pub(super) fn stated_bias(&self, plan: &Plan) -> [Option<f64>; 3] {
-        let left = (plan.bias != Bias::None).then_some(self.settings.bias_prior);
+    pub(super) fn stated_bias(&self, prepared: &Prepared) -> [Option<f64>; 3] {
+        let left = prepared.bias_left.map(|_| self.settings.bias_prior);
         match self.settings.prior.bias {
             Some(known) => known
                 .diagonal()
@@ -317,44 +339,51 @@ pub(super) fn force_scale(resolved: &Meaning, length: f64) -> f64 {
 
 /// Length of the mean specific force in a frame that does not turn, and over how many seconds.
 fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
-    let (sum, secs) = force_at_first(resolved, first, f64::INFINITY)?;
+    let recorded = |force| *resolved.force(force).as_vector();
+    let (sum, secs) = force_at_first(resolved, first, f64::INFINITY, recorded)?;
     Some((sum.norm() / secs, secs))
 }
 
+fn stamp_of(raw: &RawSample) -> Nanos {
+    raw.header.unwrap_or(raw.log)
+}
+
 /// Integral of the specific force over at most `longest` seconds in the body axes of the first sample, and over how
-/// many
-/// seconds: gravity and what the velocity changed by, however the body shakes and turns. By sums, which over a second
-/// is good enough.
+/// many seconds: gravity and what the velocity changed by, however the body shakes and turns. By sums, which over a
+/// second is good enough. `samples` in time; `force` makes one of a recorded one.
 fn force_at_first(
     resolved: &Meaning,
-    first: &[RawSample],
+    samples: &[RawSample],
     longest: f64,
+    force: impl Fn([f64; 3]) -> Vector3<f64>,
 ) -> Option<(Vector3<f64>, f64)> {
+    let is_finite = |v: &Vector3<f64>| v.iter().all(|v| v.is_finite());
     let mut attitude: Quaternion<Nav, Body> = Quaternion::identity();
     let (mut sum, mut secs) = (Vector3::zeros(), 0.0);
-    let mut last: Option<Nanos> = None;
-    for raw in first {
-        let stamp = raw.header.unwrap_or(raw.log);
-        let step = last.map_or(0.0, |last| stamp.secs_since(last));
-        last = Some(stamp);
-        let (Some(gyro), Some(force)) = (raw.gyro, raw.accel) else {
-            continue;
+    let (mut last_rate, mut last_force): (Option<Nanos>, Option<Nanos>) = (None, None);
+    for raw in samples {
+        let stamp = stamp_of(raw);
+        let step = |last: &mut Option<Nanos>| {
+            let step = last.map_or(0.0, |last| stamp.secs_since(last));
+            *last = Some(stamp);
+            (0.0..1.0).contains(&step).then_some(step)
         };
-        if !(0.0..1.0).contains(&step) {
-            return None;
+        if let Some(gyro) = raw.gyro {
+            let turn = resolved.turned(gyro, step(&mut last_rate)?);
+            if is_finite(&turn.0) {
+                attitude = attitude.advanced(&turn.about_fixed_axis());
+            }
         }
-        if secs + step > longest {
-            break;
+        if let Some(force) = raw.accel.map(&force) {
+            let step = step(&mut last_force)?;
+            if secs + step > longest {
+                break;
+            }
+            if is_finite(&force) {
+                sum += attitude.to_dcm().as_matrix() * force * step;
+                secs += step;
+            }
         }
-        let turn = resolved.turned(gyro, step);
-        let force = resolved.force(force);
-        let mut numbers = turn.0.iter().chain(force.as_vector().iter());
-        if !numbers.all(|v| v.is_finite()) {
-            continue;
-        }
-        attitude = attitude.advanced(&turn.about_fixed_axis());
-        sum += (attitude.to_dcm() * force).as_vector() * step;
-        secs += step;
     }
     (secs > LEAST_SECS).then_some((sum, secs))
 }

@@ -4,7 +4,7 @@
 //! out of a sample, while the filter knows body axes and what is left.
 
 use super::meaning::Meaning;
-use super::plan::{BIAS_LEFT, Bias, Noise, Plan};
+use super::plan::{Noise, Plan};
 use super::preparation::Prepared;
 use super::sensor_calibration::{Known, SensorCalibration};
 use super::smoothing::Recording;
@@ -183,10 +183,10 @@ pub fn learned(
     } else {
         SWITCHED_OFF
     };
-    if plan.bias != Bias::None {
+    if let Some(left) = prepared.bias_left {
         known.bias = Some(Known {
             value: (from_gyro * prepared.bias.0).into(),
-            sigma: Some([BIAS_LEFT.hypot(switched_off); 3]),
+            sigma: Some([left.hypot(switched_off); 3]),
             observed: [true; 3],
         });
     }
@@ -198,7 +198,14 @@ pub fn learned(
         });
     }
     if let Some(Recording { smoothed, .. }) = recording {
-        by_smoother(&mut known, (resolved, prepared), smoothed, switched_off);
+        let class = [plan.noise.bias_of_class(); 3];
+        by_smoother(
+            &mut known,
+            (resolved, prepared),
+            smoothed,
+            class,
+            switched_off,
+        );
         return known;
     }
     let Some(filter) = filter.filter(|f| f.is_started() && !f.is_force_implausible()) else {
@@ -266,11 +273,12 @@ pub fn learned(
     known
 }
 
-/// Calibration that a whole recording gives.
+/// Calibration that a whole recording gives. `class`: one sigma of the bias where the recording tells nothing of it.
 fn by_smoother(
     known: &mut SensorCalibration,
     (resolved, prepared): (&Meaning, &Prepared),
     smoothed: &Smoothed,
+    class: [f64; 3],
     switched_off: f64,
 ) {
     let found = smoothed.calibration();
@@ -302,9 +310,9 @@ fn by_smoother(
         let value = from_gyro * (prepared.bias.0 + last.value);
         known.bias = Some(now_known(
             known.bias.as_ref(),
-            [f64::INFINITY; 3],
+            class,
             value.into(),
-            sigma,
+            observed(sigma, class),
             switched_off,
         ));
     }

@@ -198,7 +198,7 @@ impl Estimator {
                         bias_sigma: plan.noise.bias_of_class(),
                         gyro_range: aiding.settings.gyro_range,
                         known: Beforehand {
-                            gyro_bias: aiding.stated_bias(plan),
+                            gyro_bias: aiding.stated_bias(prepared),
                             ..resolved.beforehand()
                         },
                     };

@@ -18,8 +18,10 @@ use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
 use std::sync::Arc;
 
-/// Bias left in a gyro whose bias was removed, rad/s: what it may have become since.
-pub(super) const BIAS_LEFT: f64 = 1e-3;
+/// Bias left in a gyro whose bias was given, rad/s: what it may have become since.
+const BIAS_LEFT: f64 = 1e-3;
+/// Bias left in a gyro whose bias was found at rest, rad/s (0.15 deg/s): in motion it is another.
+const BIAS_LEFT_BY_REST: f64 = 2.6e-3;
 
 /// Settings by which the samples of a run are understood and integrated: the estimation flags, checked.
 /// `None` = the format decides where it states it, else the default.
@@ -127,7 +129,7 @@ impl Default for Plan {
             mount: None,
             clock: Clock::Header,
             initial: Initial::Identity,
-            bias: Bias::None,
+            bias: Bias::Unsaid,
             max_gap_secs: 0.5,
             on_gap: OnGap::Hold,
             latitude_deg: None,
@@ -168,7 +170,7 @@ impl Plan {
             on_gap: self.on_gap,
             bias: match self.bias {
                 Bias::Given(bias) => bias,
-                Bias::None | Bias::Auto => BodyRate::ZERO,
+                Bias::Unsaid | Bias::None | Bias::Auto => BodyRate::ZERO,
             },
             gyro_range: self.gyro_range,
             start: self.start,
@@ -352,12 +354,26 @@ pub enum Initial {
 /// `--bias`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Bias {
+    /// Estimate from the rests of a file whose attitude is aided, where it has any that can be no turn; otherwise
+    /// nothing is subtracted.
+    Unsaid,
     /// Nothing is subtracted.
     None,
     /// Estimate from detected rest; refused when there is none.
     Auto,
     /// Bias as given.
     Given(BodyRate),
+}
+
+impl Bias {
+    /// One standard deviation of what is left of a bias that this removes, rad/s; `None` where it removes none.
+    pub(super) fn left(self) -> Option<f64> {
+        match self {
+            Bias::Unsaid | Bias::None => None,
+            Bias::Auto => Some(BIAS_LEFT_BY_REST),
+            Bias::Given(_) => Some(BIAS_LEFT),
+        }
+    }
 }
 
 /// `--noise`: what the covariance is made of. 1 sigma, about the body axes x, y, z.

@@ -39,6 +39,9 @@ pub struct Prepared {
     pub bias_sigma: Vector3<f64>,
     /// Origin of the bias.
     pub bias_origin: String,
+    /// One standard deviation of what is left of a bias that was given or found at rest, rad/s; `None` where the
+    /// bias is neither.
+    pub bias_left: Option<f64>,
     /// q_nb at the first sample, ENU (or start) and FLU.
     pub initial: Quaternion<Nav, Body>,
     /// Origin of the initial attitude.
@@ -81,7 +84,9 @@ pub struct Preparation {
     stamps: Option<StampPass>,
     /// Rates (rad/s, sensor axes), where it is to be seen whether they were cut.
     rates: Option<Vec<[f64; 3]>>,
-    /// Specific forces came in messages of their own; before the first sample.
+    /// The first specific forces that came in messages of their own.
+    beside: Vec<RawSample>,
+    /// Whether there are any; before the first sample.
     forces_beside: [bool; 2],
 }
 
@@ -96,12 +101,14 @@ impl Preparation {
             first: Vec::new(),
             taken: 0,
             last: None,
-            rest: needs_rest(plan).then(|| RestPass::new(plan, resolved)),
+            rest: (needs_rest(plan) || looks_for_bias(plan, resolved, patience))
+                .then(|| RestPass::new(plan, resolved)),
             stamps: None,
             rates: (looks_for_truncation(plan)
                 && patience == Patience::WholeLog
                 && !matches!(resolved.kind, SampleKind::DeltaAngle | SampleKind::Rotation))
             .then(Vec::new),
+            beside: Vec::new(),
             forces_beside: [false; 2],
         }
     }
@@ -118,9 +125,7 @@ impl Preparation {
     /// In words, when the settings do not fit.
     pub fn take(&mut self, raw: &RawSample) -> Result<(), Diagnostic> {
         if raw.is_beside {
-            let is_force = raw.accel.is_some();
-            self.forces_beside[0] |= is_force;
-            self.forces_beside[1] |= is_force && self.taken == 0;
+            self.take_beside(raw);
             return Ok(());
         }
         if self.first.len() < FEW {
@@ -140,8 +145,23 @@ impl Preparation {
             rates.push(gyro.map(|w| w * self.resolved.unit.to_rad()));
         }
         match &mut self.rest {
-            Some(rest) => rest.push(std::slice::from_ref(raw)),
-            None => Ok(()),
+            // What nobody asked for is not worth a pass over hours.
+            Some(rest) if self.taken <= MANY || needs_rest(&self.plan) => {
+                rest.push(std::slice::from_ref(raw))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes a message of its own that carries a specific force; what carries none is passed over.
+    pub fn take_beside(&mut self, raw: &RawSample) {
+        if raw.accel.is_none() {
+            return;
+        }
+        self.forces_beside[0] = true;
+        self.forces_beside[1] |= self.taken == 0;
+        if self.beside.len() < FEW {
+            self.beside.push(*raw);
         }
     }
 
@@ -159,7 +179,8 @@ impl Preparation {
         match self.patience {
             Patience::WholeLog => {
                 let wants_rates = self.rates.as_ref().is_some_and(|rates| rates.len() < MANY);
-                self.rest.is_some() || self.stamps.is_some() || wants_rates
+                let wants_rest = needs_rest(&self.plan) || self.taken < MANY;
+                (self.rest.is_some() && wants_rest) || self.stamps.is_some() || wants_rates
             }
             Patience::FirstMinute => {
                 self.rest.is_some()
@@ -183,6 +204,7 @@ impl Preparation {
             rest,
             stamps,
             rates,
+            beside,
             forces_beside,
             ..
         } = self;
@@ -200,7 +222,7 @@ impl Preparation {
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         // The method of a daemon decides as a daemon: by the first sample.
         let (looked_at, is_beside) = match plan.method {
-            Method::Live { .. } | Method::CommitProvisional { .. } if plan.aid == Aid::Auto => {
+            method if is_live(method) && plan.aid == Aid::Auto => {
                 (first.get(..1).unwrap_or(&first), forces_beside[1])
             }
             _ => (first.as_slice(), forces_beside[0]),
@@ -210,15 +232,23 @@ impl Preparation {
                 || (is_beside && looked_at.iter().all(|raw| raw.accel.is_none())),
             ..plan
         };
-        let aiding = Aiding::decide(&plan, &resolved, looked_at, &mut warnings)?;
+        let is_bias_unsaid = plan.bias == Bias::Unsaid;
+        let (mut plan, told, turn) = match looks_for_bias(&plan, &resolved, patience) {
+            true => with_bias_of_rest(plan, &rests),
+            false => (plan, rests.clone(), None),
+        };
+        let mut aiding = Aiding::decide(&plan, &resolved, looked_at, &mut warnings)?;
+        if aiding.is_some() {
+            warnings.extend(turn);
+        } else if is_bias_unsaid {
+            // The gyro alone is as it was recorded.
+            plan.bias = Bias::None;
+        }
         // A run that begins later, and a method that waits for nothing, has the first sample alone.
-        let is_read_ahead = !matches!(
-            plan.method,
-            Method::Live { .. } | Method::CommitProvisional { .. }
-        );
-        let aiding = aiding.map(|aiding| {
+        let is_read_ahead = !is_live(plan.method);
+        aiding = aiding.map(|aiding| {
             if is_read_ahead && plan.start.is_none() {
-                aiding.levelled_by_mean(&resolved, &first)
+                aiding.levelled_by_mean(&resolved, &first, &beside)
             } else {
                 aiding
             }
@@ -231,11 +261,26 @@ impl Preparation {
             &mut warnings,
         )?;
         let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
-        let (bias, bias_sigma, bias_origin) = decide_bias(
+        let (bias, bias_sigma, mut bias_origin) = decide_bias(
             (&plan, &resolved),
-            &rests,
+            &told,
             earth.map(|e| e.felt_by(&initial)),
         )?;
+        let mut bias_left = plan.bias.left();
+        if let (Some(left), Bias::Auto) = (&mut bias_left, plan.bias) {
+            // Rests that differ tell it no better than that.
+            *left = left.hypot(bias_sigma.max());
+            if told.can_be_turns() {
+                bias_origin += " (or a steady turn about the vertical: nothing here can tell)";
+            }
+            if is_bias_unsaid {
+                bias_origin += &format!(", by default ({BIAS} none: left in)");
+            }
+            if let Some(aiding) = &mut aiding {
+                let prior = &mut aiding.settings.bias_prior;
+                *prior = prior.hypot(bias_sigma.max());
+            }
+        }
         let found = stamps.map(StampPass::finish).transpose()?;
         let stamps = match (found, patience) {
             (None, _) => Stamps::AsRecorded,
@@ -262,6 +307,7 @@ impl Preparation {
             bias,
             bias_sigma,
             bias_origin,
+            bias_left,
             initial,
             initial_origin,
             tilt_sigma: rests.kept.first().map_or(0.0, |rest| rest.tilt_sigma),
@@ -351,6 +397,7 @@ pub fn at_once(
         bias,
         bias_sigma,
         bias_origin,
+        bias_left: plan.bias.left(),
         initial,
         initial_origin,
         tilt_sigma: 0.0,
@@ -364,6 +411,36 @@ pub fn at_once(
 /// Whether the plan asks for something only rest can tell.
 fn needs_rest(plan: &Plan) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
+}
+
+/// Whether nobody has said the bias of a file that is aided, and a rest would tell it better than its class. With the
+/// Earth's rotation taken out it is the rest at the start alone that could, and on the way the filter learns as much.
+fn looks_for_bias(plan: &Plan, resolved: &Meaning, patience: Patience) -> bool {
+    plan.bias == Bias::Unsaid
+        && plan.aid != Aid::None
+        && patience == Patience::WholeLog
+        && !is_live(plan.method)
+        && plan.latitude_deg.is_none()
+        && resolved.calibrated_bias(&plan.noise).is_none()
+        && Bias::Auto.left() < Some(plan.noise.bias_of_class())
+}
+
+/// The plan with the bias of a file's rests, if they tell it, those that do, and what to say of the others.
+fn with_bias_of_rest(plan: Plan, rests: &Rests) -> (Plan, Rests, Option<Diagnostic>) {
+    let (rests, turn) = rests.less_turns(plan.noise.bias_of_class());
+    let bias = match stillness::estimate_bias(&rests, &Limits::default()) {
+        Ok(_) => Bias::Auto,
+        Err(_) => Bias::None,
+    };
+    (Plan { bias, ..plan }, rests, turn)
+}
+
+/// Whether the method waits for nothing, as a daemon.
+fn is_live(method: Method) -> bool {
+    matches!(
+        method,
+        Method::Live { .. } | Method::CommitProvisional { .. }
+    )
 }
 
 /// Whether it is to be seen from the data if their driver has cut them.
@@ -452,7 +529,7 @@ fn decide_bias(
     earth: Option<Vector3<f64>>,
 ) -> Result<(BodyRate, Vector3<f64>, String), Diagnostic> {
     match plan.bias {
-        Bias::None => Ok(match resolved.calibrated_bias(&plan.noise) {
+        Bias::Unsaid | Bias::None => Ok(match resolved.calibrated_bias(&plan.noise) {
             Some((bias, sigma)) => (BodyRate(bias), sigma, "as calibrated".to_owned()),
             None => (
                 BodyRate::ZERO,

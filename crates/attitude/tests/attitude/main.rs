@@ -7,6 +7,7 @@ mod condition;
 mod conventions;
 mod covariance;
 mod properties;
+mod rests;
 mod sensor_error;
 #[path = "../../../../tests/shared_data/mod.rs"]
 mod shared_data;

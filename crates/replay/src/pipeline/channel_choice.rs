@@ -230,10 +230,19 @@ pub(super) fn reference(
 }
 
 /// The way of a channel's messages to the streams, with what is noticed put aside.
-pub(super) fn looked_at(chosen: &[Chosen<'_>], channel: &Channel) -> Option<Route> {
-    to_streams(chosen, channel, |chosen| {
+pub(super) fn looked_at(
+    chosen: &[Chosen<'_>],
+    besides: Option<&Besides>,
+    channel: &Channel,
+) -> Option<Route> {
+    let beside = besides.and_then(|besides| besides.decoder(channel).cloned());
+    let samples = to_streams(chosen, channel, |chosen| {
         Arc::new(Noticed::of(&chosen.plan.source))
-    })
+    });
+    match samples {
+        Some(samples) => Some(samples.beside(beside)),
+        None => Route::other(beside, None),
+    }
 }
 
 fn to_streams(

@@ -21,6 +21,7 @@ use std::ops::ControlFlow;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::beside::Besides;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::opened::AHEAD;
 
@@ -62,7 +63,7 @@ pub(super) fn each(
         }
     };
 
-    let prepared = prepare(run, log, &chosen, pool)?;
+    let prepared = prepare(run, log, (&chosen, &Besides::default()), pool)?;
     let mut topics = Vec::new();
     let mut streams: Vec<Stream> = Vec::new();
     let mut kept = Vec::new();

@@ -24,6 +24,7 @@ use strapd_recording::Recording;
 use strapd_recording::Source;
 use strapd_recording::format::open;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::beside::Besides;
 use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::incoming::{Incoming, incoming};
 use strapd_recording::recording::input::is_pipe;
@@ -134,7 +135,7 @@ fn file(
     }
     let reference = reference(run, path, &log, &chosen, false)?;
     let besides = besides(run, path, &log, &mut chosen)?;
-    let prepared = prepare(run, &log, &chosen, pool)?
+    let prepared = prepare(run, &log, (&chosen, &besides), pool)?
         .into_iter()
         .collect::<Result<Vec<Prepared>>>()?;
     let starts = chosen.iter().map(|c| (c.found.clone(), c.stream.clone()));
@@ -188,7 +189,7 @@ pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
 pub(super) fn prepare(
     run: &ReplayRequest,
     log: &Recording,
-    chosen: &[Chosen<'_>],
+    (chosen, besides): (&[Chosen<'_>], &Besides),
     pool: &Pool,
 ) -> Result<Vec<Result<Prepared>>> {
     let mut preparations: Vec<Preparation> = chosen
@@ -199,11 +200,19 @@ pub(super) fn prepare(
     log.walk::<Error>(
         A_LITTLE_AHEAD,
         pool,
-        |channel| looked_at(chosen, channel),
+        |channel| {
+            let forces = run.plan.has_forces_beside.then_some(besides);
+            looked_at(chosen, forces, channel)
+        },
         |items| {
             for item in items.drain(..) {
-                let Item::Sample(stream, raw) = item else {
-                    continue;
+                let (stream, raw) = match item {
+                    Item::Sample(stream, raw) => (stream, raw),
+                    Item::Beside(raw) => {
+                        preparations.iter_mut().for_each(|p| p.take_beside(&raw));
+                        continue;
+                    }
+                    _ => continue,
                 };
                 if let (Some(preparation), Some(failure @ None)) =
                     (preparations.get_mut(stream), failures.get_mut(stream))

@@ -86,12 +86,12 @@ impl<'r> StreamStart<'r> {
             return session.consume(held.into_iter().chain(items), pool);
         }
         for item in items {
-            if let (Item::Sample(_, raw), Some((found, _, preparation))) =
-                (&item, &mut self.gathering)
-            {
-                preparation
+            match (&item, &mut self.gathering) {
+                (Item::Sample(_, raw), Some((found, _, preparation))) => preparation
                     .take(raw)
-                    .map_err(|what| refused(self.path, &found.name, what))?;
+                    .map_err(|what| refused(self.path, &found.name, what))?,
+                (Item::Beside(raw), Some((_, _, preparation))) => preparation.take_beside(raw),
+                _ => {}
             }
             if let Some(held) = &mut self.held {
                 held.push(item);

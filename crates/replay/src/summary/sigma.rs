@@ -93,11 +93,11 @@ fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
     let known = plan.calibration.as_deref();
     let noise = &known.map_or_else(|| plan.noise.clone(), |known| known.narrowed(&plan.noise));
     let (turn_on, note) = match plan.bias {
-        Bias::None if known.is_some_and(|known| known.bias.is_some()) => (
+        Bias::Unsaid | Bias::None if known.is_some_and(|known| known.bias.is_some()) => (
             bias_sigma,
             format!(" (left by {CALIBRATION}, flicker in it)"),
         ),
-        Bias::None => (noise.turn_on_bias, format!(" ({BIAS} removes it)")),
+        Bias::Unsaid | Bias::None => (noise.turn_on_bias, format!(" ({BIAS} removes it)")),
         Bias::Auto | Bias::Given(_) => (noise.left_of_turn_on(), format!(" (left by {BIAS})")),
     };
     let (initial, note_of_start) = match plan.initial {
