@@ -308,7 +308,7 @@ fn initial(given: &Given<'_, '_>) -> PyResult<Initial> {
 
 fn bias(given: &Given<'_, '_>) -> PyResult<Bias> {
     let Some(value) = given.get("bias")? else {
-        return Ok(Bias::None);
+        return Ok(Bias::Unsaid);
     };
     let wrong = || {
         argument(format!(

@@ -161,7 +161,9 @@ impl Words {
             mount: self.quaternion("mount")?,
             clock: self.clock()?,
             initial: parse_initial(self.text("init").unwrap_or("identity"))?,
-            bias: parse_bias(self.text("bias").unwrap_or("none"))?,
+            bias: self
+                .text("bias")
+                .map_or(Ok(plain.bias), parse_bias)?,
             max_gap_secs: self.parsed("max_gap")?.unwrap_or(plain.max_gap_secs),
             on_gap: self
                 .one_of("on_gap", &policies.map(|p| (p.name(), p)))?

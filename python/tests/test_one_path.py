@@ -166,6 +166,22 @@ def test_what_could_not_be_smoothed_as_asked_is_said_as_by_the_command(command: 
     assert "converged" in outcomes and outcomes - {"converged"}, outcomes
 
 
+def test_a_bias_that_nothing_tells_is_said_of_a_filter_and_of_a_smoother() -> None:
+    # Upright at 1 m/s, never at rest: the force towards the middle and nothing else.
+    t = np.arange(0.0, 60.0, 0.01)
+    rate = 0.6 * np.sin(0.7 * t) + 0.4 * np.sin(1.9 * t + 1.0)
+    gyr = np.column_stack([0.001 * np.sin(31.0 * t), 0.001 * np.cos(29.0 * t), rate])
+    acc = np.column_stack([np.zeros_like(t), rate, np.full_like(t, 9.81)])
+    for smooth in (False, True):
+        att = strapd.estimate(gyr, acc, rate_hz=100.0, smooth=smooth)
+        assert att.bias_unobserved and "bias not observed" in repr(att), (smooth, att)
+    live = strapd.Estimator(rate_hz=100.0)
+    live.push(gyr, acc)
+    assert live.summary["aid"]["bias_unobserved"]
+    hand = strapd.simulate("hand", noise="consumer_imu", rate_hz=100, duration=30, seed=5)
+    assert not strapd.estimate(hand.gyr, hand.acc, t=hand.t).bias_unobserved
+
+
 def test_the_bias_of_a_smoothed_recording_is_the_smoothers() -> None:
     hand = strapd.simulate("hand", noise="consumer_imu", rate_hz=100, duration=90, seed=5)
     smoothed = strapd.estimate(hand.gyr, hand.acc, t=hand.t, smooth=True)

@@ -148,6 +148,15 @@ class Attitude:
         sigma = self.summary.get("bias_sigma_rad_s")
         return None if sigma is None else np.array(sigma)
 
+    @property
+    def bias_unobserved(self) -> bool:
+        """Whether nothing tells the bias about the vertical, by what made the attitude, so that heading drifts by it."""
+        if self.smoothing not in (None, "filter"):
+            held = self.summary["smooth"]["held_bias"]
+            return held is not None and not held["by_rest"]
+        aid = self.summary["aid"]
+        return aid is not None and bool(aid["bias_unobserved"])
+
     def _learned_bias(self) -> Optional[tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]]:
         """The bias beside what was removed beforehand, and its sigma, by what made the attitude."""
         if self.smoothing not in (None, "filter"):
@@ -271,6 +280,8 @@ class Attitude:
         by = "gyro alone" if aid is None else aid["by"]
         if self.smoothing is not None:
             by += {"converged": ", smoothed", "filter": ", NOT SMOOTHED"}.get(self.smoothing, f", smoothed ({self.smoothing})")
+        if self.bias_unobserved:
+            by += ", bias not observed"
         lost = f", lost {self.lost} of {self.summary['samples']['total']} samples" if self.lost else ""
         return (
             f"<strapd.Attitude: {n} over {secs:.3f} s, {by}, world {self.world}, body {self.body}{lost}; "
