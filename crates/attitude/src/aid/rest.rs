@@ -107,7 +107,10 @@ impl Rest {
             self.forget();
             return None;
         }
-        if let Some(last) = self.last_force.replace(self.force) {
+        // Before that the mean force is still that of what came before.
+        if self.quiet > 2.0 * MEAN_SECS
+            && let Some(last) = self.last_force.replace(self.force)
+        {
             self.swing.take([&last, &self.force], &off, secs);
         }
         if self.swing.is_turn() {
@@ -135,7 +138,7 @@ impl Rest {
             is_open
         });
         let certain = self.open.len() - late.count();
-        if certain < FEW {
+        if certain < FEW || self.swing.is_open(secs) {
             return None;
         }
         let known = || self.open.iter().take(certain);

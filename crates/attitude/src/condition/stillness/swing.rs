@@ -7,6 +7,8 @@ use nalgebra::Vector3;
 
 /// Least angle that the gyro must have read for it to be judged, rad (0.25 deg).
 const LEAST: f64 = 0.0044;
+/// A rate across the vertical that is no matter, turn or not, rad/s (0.1 deg/s).
+const SLOW: f64 = 0.0017;
 /// Share of what the gyro reads from which gravity follows it.
 const FOLLOWS: f64 = 0.5;
 /// Square of the sigmas by which it must.
@@ -47,6 +49,11 @@ impl Swing {
         self.read * self.steps > LEAST * LEAST
             && self.seen > FOLLOWS * self.read
             && product * (2.0 * self.steps - 1.0) > SURE * left
+    }
+
+    /// Whether steps of `secs` have not told yet whether a rate of this size is a turn.
+    pub(crate) fn is_open(&self, secs: f64) -> bool {
+        self.read * self.steps <= LEAST * LEAST && self.read > (SLOW * secs).powi(2) * self.steps
     }
 
     /// Whether it can have come about.
