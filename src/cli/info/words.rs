@@ -186,6 +186,19 @@ fn write_topic(looked: &Inspection, out: &mut String) {
             looked.clock.name()
         );
     }
+    write_meaning(looked, out);
+    for line in super::aids::lines(&looked.aid) {
+        let _ = writeln!(out, "   {line}");
+    }
+    write_rest(looked, out);
+    for finding in of_samples(looked) {
+        let _ = writeln!(out, "   {}: {}", finding.severity.name(), finding.line());
+    }
+}
+
+/// What the orientations are, and what a sample is taken for.
+fn write_meaning(looked: &Inspection, out: &mut String) {
+    let q = &looked.quality;
     let _ = writeln!(
         out,
         "   orientation: {}; a sample is taken as {}{}",
@@ -203,9 +216,10 @@ fn write_topic(looked: &Inspection, out: &mut String) {
             " (--sample-kind)"
         }
     );
-    for line in super::aids::lines(&looked.aid) {
-        let _ = writeln!(out, "   {line}");
-    }
+}
+
+/// The first rest, and the bias that it tells.
+fn write_rest(looked: &Inspection, out: &mut String) {
     match (&looked.bias, looked.rests.kept.first(), looked.rests.first) {
         (Some(bias), Some(rest), Some(first)) => {
             let [x, y, z]: [f64; 3] = bias.bias.into();
@@ -224,8 +238,5 @@ fn write_topic(looked: &Inspection, out: &mut String) {
         _ => {
             let _ = writeln!(out, "   rest: none found");
         }
-    }
-    for finding in of_samples(looked) {
-        let _ = writeln!(out, "   {}: {}", finding.severity.name(), finding.line());
     }
 }

@@ -249,43 +249,10 @@ impl Common {
             stamps,
             seed: self.seed,
         };
+        let mut parameters = made.parameters;
+        parameters.extend(self.parameters(&sampling));
         let source = Synthetic::new(made.motion, sampling)
             .map_err(|e| Error::usage(Diagnostic::from(&e).at(format_args!("simulate {name}"))))?;
-        let mut parameters = made.parameters;
-        parameters.extend([
-            parameter("gravity_m_s2", gravity),
-            parameter("rate_hz", self.rate_hz),
-            parameter("duration_s", self.duration),
-            parameter("seed", self.seed),
-            parameter("start_stamp_ns", start.0),
-            parameter("noise", error.text()),
-        ]);
-        if lever != [0.0; 3] {
-            let [x, y, z] = lever;
-            parameters.push(parameter("lever_arm_m", format!("{x},{y},{z}")));
-        }
-        if force == ForceSampling::AsGyro {
-            parameters.push(parameter("force_sampling", "as-gyro"));
-        }
-        if let Some(rate) = self.mag {
-            parameters.push(parameter("mag_rate_hz", rate.unwrap_or(self.rate_hz)));
-            parameters.push(parameter("field_ut_deg_deg", &self.field));
-            for disturbance in &self.field_disturbance {
-                parameters.push(parameter("field_disturbance", disturbance));
-            }
-        }
-        for (name, value, plain) in [
-            ("jitter", stamps.sampling_jitter, 0.0),
-            ("stamp_jitter", stamps.stamp_jitter, 0.0),
-            ("stamp_offset_ns", stamps.offset_nanos as f64, 0.0),
-            ("stamp_drift_ppm", stamps.drift_ppm, 0.0),
-            ("drop", stamps.drop_probability, 0.0),
-            ("burst", stamps.burst_length, 1.0),
-        ] {
-            if value != plain {
-                parameters.push(parameter(name, value));
-            }
-        }
         if let Some(sensor) = source.sensor() {
             let bias = sensor.constants().bias;
             if bias.amax() > 0.0 {
@@ -324,6 +291,46 @@ impl Common {
 }
 
 impl Common {
+    /// Names and values of the sampling, as the simulation states them.
+    fn parameters(&self, sampling: &Sampling) -> Vec<(String, String)> {
+        let mut parameters = vec![
+            parameter("gravity_m_s2", sampling.gravity),
+            parameter("rate_hz", self.rate_hz),
+            parameter("duration_s", self.duration),
+            parameter("seed", self.seed),
+            parameter("start_stamp_ns", sampling.start.0),
+            parameter("noise", sampling.error.text()),
+        ];
+        let [x, y, z] = sampling.lever_b.into();
+        if [x, y, z] != [0.0; 3] {
+            parameters.push(parameter("lever_arm_m", format!("{x},{y},{z}")));
+        }
+        if sampling.force == ForceSampling::AsGyro {
+            parameters.push(parameter("force_sampling", "as-gyro"));
+        }
+        if let Some(rate) = self.mag {
+            parameters.push(parameter("mag_rate_hz", rate.unwrap_or(self.rate_hz)));
+            parameters.push(parameter("field_ut_deg_deg", &self.field));
+            for disturbance in &self.field_disturbance {
+                parameters.push(parameter("field_disturbance", disturbance));
+            }
+        }
+        let stamps = &sampling.stamps;
+        for (name, value, plain) in [
+            ("jitter", stamps.sampling_jitter, 0.0),
+            ("stamp_jitter", stamps.stamp_jitter, 0.0),
+            ("stamp_offset_ns", stamps.offset_nanos as f64, 0.0),
+            ("stamp_drift_ppm", stamps.drift_ppm, 0.0),
+            ("drop", stamps.drop_probability, 0.0),
+            ("burst", stamps.burst_length, 1.0),
+        ] {
+            if value != plain {
+                parameters.push(parameter(name, value));
+            }
+        }
+        parameters
+    }
+
     fn magnetometer(&self) -> Result<Option<Magnetometer>> {
         let Some(rate) = self.mag else {
             return Ok(None);

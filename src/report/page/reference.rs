@@ -3,7 +3,7 @@
 use super::charts::{self, Bounded, Time};
 use super::markup::{escaped, figure, sentence, table};
 use crate::report::against;
-use crate::report::series::Errors;
+use crate::report::series::{ErrorTrace, Errors};
 use crate::report::summary::{TopicSummary, significant};
 use std::fmt::Write as _;
 use strapd_attitude::compare::ErrorStats;
@@ -21,17 +21,10 @@ pub(super) fn section(
         return;
     };
     if errors.traces.is_empty() {
-        let why = match (errors.usable, errors.unusable) {
-            (0, 0) => "the messages carry no orientation, or mark it as absent".to_owned(),
-            (0, bad) => format!("none of the {bad} recorded orientations is a rotation"),
-            (n, _) => format!(
-                "none of the {n} reference attitudes lies within the time of the estimate; are both on the same clock (--time)?"
-            ),
-        };
         let _ = writeln!(
             out,
             "<p>No error can be given: {}. <code>--reference FILE</code> names another reference.</p>",
-            escaped(&why)
+            escaped(&why_none(errors))
         );
         return;
     }
@@ -49,32 +42,7 @@ pub(super) fn section(
     {
         out.push_str("<p>All recorded orientations are the same: the field is not filled, and this is no reference.</p>\n");
     }
-    let mut rows = Vec::new();
-    for trace in &errors.traces {
-        let Some(found) = &trace.comparison.errors else {
-            continue;
-        };
-        let deg = |v: f64| significant(v.to_degrees(), 3);
-        let three = |s: &ErrorStats| format!("{} / {} / {}", deg(s.rms), deg(s.p95), deg(s.max));
-        let over = trace
-            .comparison
-            .relative_1s
-            .map_or("no two 1 s apart".to_owned(), |r| {
-                format!("{} / {}", deg(r.median), deg(r.p95))
-            });
-        let used = if trace.is_used {
-            " (as taken here)"
-        } else {
-            ""
-        };
-        rows.push(vec![
-            format!("{}{used}: {}", trace.kind, trace.meaning),
-            over,
-            three(&found.total),
-            three(&found.heading),
-            three(&found.inclination),
-        ]);
-    }
+    let rows: Vec<_> = errors.traces.iter().filter_map(row).collect();
     out.push_str(&table(
         "numbers",
         &[
@@ -86,6 +54,60 @@ pub(super) fn section(
         ],
         &rows,
     ));
+    say_left_out(errors, out);
+    if let Some((found, _)) = &errors.bounds {
+        let judged = against::beyond_sigma(found)
+            .map_or_else(|| "Sigma holds".to_owned(), |beyond| sentence(&beyond));
+        let _ = writeln!(
+            out,
+            "<p id=\"within-sigma\">{}. {}; {}.</p>",
+            escaped(&judged),
+            escaped(&sentence(&against::within_sigma(found))),
+            against::alignment(found.align)
+        );
+    }
+    if let Some((time, stretches)) = drawn {
+        draw(errors, time, stretches, out);
+    }
+}
+
+/// Reason for which no error can be given.
+fn why_none(errors: &Errors) -> String {
+    match (errors.usable, errors.unusable) {
+        (0, 0) => "the messages carry no orientation, or mark it as absent".to_owned(),
+        (0, bad) => format!("none of the {bad} recorded orientations is a rotation"),
+        (n, _) => format!(
+            "none of the {n} reference attitudes lies within the time of the estimate; are both on the same clock (--time)?"
+        ),
+    }
+}
+
+/// Row of the table of errors, for one meaning that a sample can have.
+fn row(trace: &ErrorTrace) -> Option<Vec<String>> {
+    let found = trace.comparison.errors.as_ref()?;
+    let deg = |v: f64| significant(v.to_degrees(), 3);
+    let three = |s: &ErrorStats| format!("{} / {} / {}", deg(s.rms), deg(s.p95), deg(s.max));
+    let over = trace
+        .comparison
+        .relative_1s
+        .map_or("no two 1 s apart".to_owned(), |r| {
+            format!("{} / {}", deg(r.median), deg(r.p95))
+        });
+    let used = match trace.is_used {
+        true => " (as taken here)",
+        false => "",
+    };
+    Some(vec![
+        format!("{}{used}: {}", trace.kind, trace.meaning),
+        over,
+        three(&found.total),
+        three(&found.heading),
+        three(&found.inclination),
+    ])
+}
+
+/// Says how many attitudes of the reference were not compared, and why.
+fn say_left_out(errors: &Errors, out: &mut String) {
     let left = errors.traces.first().map(|t| t.comparison.left_out);
     let counted = left.map_or_else(Vec::new, |l| {
         vec![
@@ -107,20 +129,10 @@ pub(super) fn section(
             errors.stride
         );
     }
-    if let Some((found, _)) = &errors.bounds {
-        let judged = against::beyond_sigma(found)
-            .map_or_else(|| "Sigma holds".to_owned(), |beyond| sentence(&beyond));
-        let _ = writeln!(
-            out,
-            "<p id=\"within-sigma\">{}. {}; {}.</p>",
-            escaped(&judged),
-            escaped(&sentence(&against::within_sigma(found))),
-            against::alignment(found.align)
-        );
-    }
-    let Some((time, stretches)) = drawn else {
-        return;
-    };
+}
+
+/// Pictures of the errors and their bounds.
+fn draw(errors: &Errors, time: Time, stretches: usize, out: &mut String) {
     if let Some((_, trace)) = &errors.bounds {
         let trace = trace.reduced(stretches);
         for (id, part) in [

@@ -22,30 +22,7 @@ type Row = (&'static str, &'static str, Vec<(f64, f64)>);
 /// The strips that have something in them; `None` when none has.
 pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String> {
     let end = drawn.elapsed.x().max(1) as f64;
-    let mut rows: Vec<Row> = Vec::new();
-    for (mark, marks) in Mark::ALL.iter().zip(&drawn.marks) {
-        if marks.samples == 0 {
-            continue;
-        }
-        let class = match mark {
-            Mark::Bridged | Mark::Moved => "mild",
-            _ => "mark",
-        };
-        let spans = marks
-            .points(0, 1.0)
-            .into_iter()
-            .filter(|p| p[0].is_finite());
-        rows.push((
-            mark.words(),
-            class,
-            spans.map(|[at, length]| (at, at + length)).collect(),
-        ));
-    }
-    if !rests.kept.is_empty() {
-        let at = |stamp| drawn.elapsed.at(stamp) as f64;
-        let spans = rests.kept.iter().map(|r| (at(r.start), at(r.end)));
-        rows.push(("at rest", "rest", spans.collect()));
-    }
+    let rows = rows(drawn, rests);
     if rows.is_empty() {
         return None;
     }
@@ -107,6 +84,30 @@ pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String>
         time.unit
     );
     Some(svg)
+}
+
+/// Strips that have something in them.
+fn rows(drawn: &Drawn, rests: &Rests) -> Vec<Row> {
+    let mut rows: Vec<Row> = Vec::new();
+    for (mark, marks) in Mark::ALL.iter().zip(&drawn.marks) {
+        if marks.samples == 0 {
+            continue;
+        }
+        let class = match mark {
+            Mark::Bridged | Mark::Moved => "mild",
+            _ => "mark",
+        };
+        let spans = marks.points(0, 1.0).into_iter();
+        let spans = spans.filter(|p| p[0].is_finite());
+        let spans = spans.map(|[at, length]| (at, at + length));
+        rows.push((mark.words(), class, spans.collect()));
+    }
+    if !rests.kept.is_empty() {
+        let at = |stamp| drawn.elapsed.at(stamp) as f64;
+        let spans = rests.kept.iter().map(|r| (at(r.start), at(r.end)));
+        rows.push(("at rest", "rest", spans.collect()));
+    }
+    rows
 }
 
 /// Round places from 0 to `end`.

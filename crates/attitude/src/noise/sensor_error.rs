@@ -242,6 +242,12 @@ impl ImuError {
                 ));
             }
         }
+        self.check_together()
+    }
+
+    /// Checks what cannot stand together.
+    fn check_together(&self) -> Result<(), ImuErrorFault> {
+        let fault = |what: String| Err(ImuErrorFault(what.into()));
         if self.bandwidth_hz.is_some() && self.damping < 0.05 {
             return fault(format!(
                 "damping={}: below 0.05 the low-pass rings for ever",

@@ -5,7 +5,7 @@
 //! in its own way.
 
 use super::json;
-use super::registers::{Form, Slot, StampForm};
+use super::registers::{Form, StampForm};
 use super::select::Found;
 use super::stamp::{Ambiguous, Bare, MOST_WAITING, Told, unit_in_log};
 use super::{Decoder, FieldRole, Plan, Unsupported, Wanted, nothing_wanted, unsupported};
@@ -151,13 +151,10 @@ impl Decoder {
         let wanted = self.options.wanted;
         let (_, slot) = wanted.vector();
         let is_reference = wanted == Wanted::Rates && one.has_orientation();
+        let has_stamp = stamped.stamp.is_some();
         let missing = self.options.fields.iter().find(|field| match field.role {
-            FieldRole::Gyro => !one.has_gyro(),
-            FieldRole::Accel => !one.registers.has(Slot::ACCEL, 3),
-            FieldRole::Mag => !one.registers.has(Slot::MAG, 3),
-            FieldRole::Orientation => !one.has_orientation(),
-            FieldRole::Stamp => stamped.stamp.is_none(),
-            FieldRole::Interval => !one.registers.has(Slot::INTERVAL, 1),
+            FieldRole::Stamp => !has_stamp,
+            role => !one.has(role),
         });
         let complaint = match missing {
             Some(field) => Some(format!(
@@ -171,16 +168,14 @@ impl Decoder {
             None => None,
         };
         let stated = &mut self.stated;
-        stated.has_gyro = one.has_gyro();
-        stated.has_accel = one.registers.has(Slot::ACCEL, 3);
-        stated.has_mag = one.registers.has(Slot::MAG, 3);
-        stated.has_orientation = one.has_orientation();
-        stated.has_stamp = stamped.stamp.is_some();
-        stated.has_interval = one.registers.has(Slot::INTERVAL, 1);
-        stated.declared.interval = one
-            .registers
-            .has(Slot::INTERVAL, 1)
-            .then(|| ("PATH".to_owned(), one.interval));
+        stated.has_gyro = one.has(FieldRole::Gyro);
+        stated.has_accel = one.has(FieldRole::Accel);
+        stated.has_mag = one.has(FieldRole::Mag);
+        stated.has_orientation = one.has(FieldRole::Orientation);
+        stated.has_stamp = has_stamp;
+        stated.has_interval = one.has(FieldRole::Interval);
+        let interval = || ("PATH".to_owned(), one.interval);
+        stated.declared.interval = stated.has_interval.then(interval);
         stated.batched = !learnt.has_gyro() && !learnt.batch.is_empty();
         stated.declared.gyro_unit = one.unit.or(stated.declared.gyro_unit);
         stated.declared.sample_kind = one.kind.or(stated.declared.sample_kind);
@@ -190,7 +185,7 @@ impl Decoder {
             Some(5) if plan.px4.is_none() => Found::Twist,
             Some(_) => Found::Named,
         };
-        let (rivals, has_stamp) = (learnt.has_rival_stamps, stamped.stamp.is_some());
+        let rivals = learnt.has_rival_stamps;
         drop(learnt);
         if rivals && !plan.trie.gives(FieldRole::Stamp) {
             self.stamps = ["the outer stamp", "the nested stamp"]

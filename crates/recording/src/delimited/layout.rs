@@ -280,16 +280,7 @@ impl Opening {
         let row = found.delimiter.row(without_mark(line));
         let mut names = match found.is_header {
             true => names_in(line, found.delimiter),
-            false => {
-                let cells = found.delimiter.cells(row).enumerate();
-                cells
-                    .map(|(n, _)| Name {
-                        text: (n + 1).to_string(),
-                        meant: Meant::Nothing,
-                        unit: None,
-                    })
-                    .collect()
-            }
+            false => numbers_as_names(found.delimiter.cells(row).count()),
         };
         let is_row = |line: &[u8]| {
             !line.iter().all(u8::is_ascii_whitespace) && !is_comment(line.trim_ascii())
@@ -368,10 +359,15 @@ impl Opening {
             .get(..all.len().min(MOST_SAID))
             .unwrap_or(&all)
             .join("`, `");
+        self.unnamed(&names, &all, &said)
+    }
+
+    /// Refusal of columns with names of which none is a rate; `all` are the names, `said` as many as are quoted.
+    fn unnamed(&self, names: &[Name], all: &[&str], said: &str) -> Diagnostic {
         if let Some(given) = self.given.as_ref().map(Columns::all) {
             let wrong = given.iter().flat_map(|given| &given.columns);
             let wrong: Vec<String> = wrong
-                .filter_map(|column| roles::place(&names, column).err())
+                .filter_map(|column| roles::place(names, column).err())
                 .collect();
             if let Some(first) = wrong.first() {
                 return format!("{COLUMNS}: {first}; its columns are `{said}`").into();
@@ -404,6 +400,16 @@ impl Opening {
             "{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)"
         ))
     }
+}
+
+/// Names of columns without a header: their numbers, from 1.
+fn numbers_as_names(columns: usize) -> Vec<Name> {
+    let name = |n: usize| Name {
+        text: n.to_string(),
+        meant: Meant::Nothing,
+        unit: None,
+    };
+    (1..=columns).map(name).collect()
 }
 
 fn numbered<'l>(

@@ -157,21 +157,8 @@ fn stream(device: u32, item: &Item<'_>, most: usize) -> Result<Option<Stream>, &
     if divisors.contains(&0.0) {
         return Err("a scale of zero");
     }
-    let mut numbers = item.numbers();
-    let mut samples = Vec::new();
-    while let (Some(a), Some(b), Some(c)) = (numbers.next(), numbers.next(), numbers.next()) {
-        if samples.len() >= most {
-            return Err("more samples than a payload may have");
-        }
-        let raw = [a, b, c];
-        let mut sample = [0.0; 3];
-        for ((value, divisor), (axis, sign)) in raw.iter().zip(divisors).zip(places) {
-            if let Some(slot) = sample.get_mut(axis) {
-                *slot = sign * value / divisor;
-            }
-        }
-        samples.push(sample);
-    }
+    let columns: Vec<_> = divisors.into_iter().zip(places).collect();
+    let samples = samples(item.numbers(), &columns, most)?;
     Ok(Some(Stream {
         device,
         what,
@@ -179,6 +166,28 @@ fn stream(device: u32, item: &Item<'_>, most: usize) -> Result<Option<Stream>, &
         stamp,
         axes,
     }))
+}
+
+/// Triples of numbers on the camera's axes, `most` of them; each column has its divisor, axis and sign.
+fn samples(
+    mut numbers: impl Iterator<Item = f64>,
+    columns: &[(f64, (usize, f64))],
+    most: usize,
+) -> Result<Vec<[f64; 3]>, &'static str> {
+    let mut samples = Vec::new();
+    while let (Some(a), Some(b), Some(c)) = (numbers.next(), numbers.next(), numbers.next()) {
+        if samples.len() >= most {
+            return Err("more samples than a payload may have");
+        }
+        let mut sample = [0.0; 3];
+        for (value, (divisor, (axis, sign))) in [a, b, c].iter().zip(columns) {
+            if let Some(slot) = sample.get_mut(*axis) {
+                *slot = sign * value / divisor;
+            }
+        }
+        samples.push(sample);
+    }
+    Ok(samples)
 }
 
 /// The letters of the columns: those of `ORIN`, or those in brackets in the name.

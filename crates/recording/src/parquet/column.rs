@@ -183,7 +183,8 @@ impl Column {
         }))
     }
 
-    fn unpack(&mut self, head: &Header, bytes: &[u8], room: u64) -> Result<Option<Page>, String> {
+    /// Refuses a page that would take more memory than its column may.
+    fn check_size(&self, head: &Header, room: u64) -> Result<(), String> {
         if head.rows > MOST_VALUES {
             return Err(format!(
                 "a page of {} values, over the limit of {MOST_VALUES}",
@@ -197,14 +198,18 @@ impl Column {
             ));
         }
         // Texts take more than their bytes.
-        let each = if self.leaf.stored == Stored::Bytes {
-            64
-        } else {
-            16
+        let each = match self.leaf.stored {
+            Stored::Bytes => 64,
+            _ => 16,
         };
         if head.rows * each + head.unpacked as u64 > room {
             return Err("more is to be held in memory at once than any table needs".to_owned());
         }
+        Ok(())
+    }
+
+    fn unpack(&mut self, head: &Header, bytes: &[u8], room: u64) -> Result<Option<Page>, String> {
+        self.check_size(head, room)?;
         let n = usize::try_from(head.rows).unwrap_or(usize::MAX);
         let mut rest = Bytes(bytes);
         let levels_2 = match head.levels {

@@ -171,15 +171,9 @@ impl<S: Read + Seek> Rows<S> {
                         || is_given(n, &said)
                 }
             };
-            let is_number = !matches!(
-                leaf.stored,
-                Stored::Boolean | Stored::Fixed(_) | Stored::Bytes
-            );
-            let is_text =
-                leaf.stored == Stored::Bytes && (footer.is_own || name.meant == Meant::Stamp);
-            let is_read = is_wanted && !leaf.is_repeated && leaf.meaning != Meaning::Other;
-            self.read
-                .push((is_read && (is_number || is_text)).then(|| leaf.clone()));
+            let may_be_text = footer.is_own || name.meant == Meant::Stamp;
+            let is_read = is_wanted && is_readable(leaf, may_be_text);
+            self.read.push(is_read.then(|| leaf.clone()));
             if n > 0 {
                 head.push(char::from(self.delimiter));
             }
@@ -190,18 +184,24 @@ impl<S: Read + Seek> Rows<S> {
                 c => c,
             }));
         }
-        // What a table of text says in every row.
+        if footer.is_own {
+            self.repeat(footer, &mut head);
+        }
+        head.push('\n');
+        self.text = head.into_bytes();
+    }
+
+    /// Adds the column that a table of text of our own repeats in every row.
+    fn repeat(&mut self, footer: &Footer, head: &mut String) {
         let has_samples = footer.leaves.iter().any(|leaf| leaf.name == "gyro_x");
         let (name, said) = match has_samples {
             true => (",sample_kind", &footer.sample_kind),
             false => (",world", &footer.world),
         };
-        if let Some(said) = said.as_ref().filter(|_| footer.is_own) {
+        if let Some(said) = said {
             head.push_str(name);
             self.behind = format!(",{}", said.replace([',', '"'], " "));
         }
-        head.push('\n');
-        self.text = head.into_bytes();
     }
 
     /// The next rows, until there is some text; none at the end.
@@ -307,4 +307,13 @@ impl<S: Read + Seek> Read for Rows<S> {
         self.given += count;
         Ok(count)
     }
+}
+/// Whether the values of a column can be read as numbers, or as text where it may hold text.
+fn is_readable(leaf: &Leaf, may_be_text: bool) -> bool {
+    let is_stored = match leaf.stored {
+        Stored::Boolean | Stored::Fixed(_) => false,
+        Stored::Bytes => may_be_text,
+        _ => true,
+    };
+    is_stored && !leaf.is_repeated && leaf.meaning != Meaning::Other
 }

@@ -85,19 +85,15 @@ impl Bag {
     ) -> io::Result<Bag> {
         let mut seen = Seen::up_to(pages.count());
         let mut faults = Vec::new();
-        let have = pages.count();
-        let is_open = match header.pages {
-            Some(need) if need > have => {
-                faults.push(Fault::at(have, FaultKind::Cut { need, have }, None));
-                false
-            }
-            Some(said) if said < have => {
-                let pages = have - said;
-                faults.push(Fault::at(said, FaultKind::Uncommitted { pages }, None));
-                true
-            }
-            _ => false,
-        };
+        let length = length_fault(header.pages, pages.count());
+        let is_open = matches!(
+            length,
+            Some(Fault {
+                kind: FaultKind::Uncommitted { .. },
+                ..
+            })
+        );
+        faults.extend(length);
         let (tables, is_whole) = definitions(pages, &mut seen, header.encoding)?;
         let named = |name: &str| {
             let is_it = |table: &&Definition| table.name.eq_ignore_ascii_case(name);
@@ -147,19 +143,12 @@ impl Bag {
             }
         };
         let topics = small.topics(of_topics, &types, to)?;
-        let places = own.and_then(|table| {
-            Some(Places {
-                topic: table.column("topic_id")?,
-                time: table.column("timestamp")?,
-                data: table.column("data")?,
-            })
-        });
         Ok(Bag {
             header,
             seen,
             table: Table::of(own.map(|table| table.root), longest),
             messages: Messages {
-                places: places.unwrap_or(Places::USUAL),
+                places: own.and_then(Places::of).unwrap_or(Places::USUAL),
                 topics,
                 longest,
                 spare: SPARE,
@@ -285,4 +274,16 @@ fn is_of_topics(page: &Page<'_>) -> Option<i64> {
     );
     let is_topic = topic.starts_with(b"/") && kind.contains(&b'/') && format == b"cdr";
     is_topic.then_some(cell.rowid)
+}
+
+/// What the number of pages that there are says against the one that the header states.
+fn length_fault(said: Option<u32>, have: u32) -> Option<Fault> {
+    match said {
+        Some(need) if need > have => Some(Fault::at(have, FaultKind::Cut { need, have }, None)),
+        Some(said) if said < have => {
+            let pages = have - said;
+            Some(Fault::at(said, FaultKind::Uncommitted { pages }, None))
+        }
+        _ => None,
+    }
 }

@@ -3,7 +3,7 @@
 //! Apart from the walk because a leaf that no tree reaches is known for one of messages by its rows.
 
 use crate::records::transcript::Transcript;
-use crate::sqlite::{Kind, Page, Row, Value};
+use crate::sqlite::{Definition, Kind, Page, Row, Value};
 use std::collections::BTreeMap;
 use std::io::Read;
 
@@ -30,6 +30,15 @@ impl Places {
         time: 2,
         data: 3,
     };
+
+    /// Places in a table that names them; none where it has not all.
+    pub(super) fn of(table: &Definition) -> Option<Places> {
+        Some(Places {
+            topic: table.column("topic_id")?,
+            time: table.column("timestamp")?,
+            data: table.column("data")?,
+        })
+    }
 }
 
 /// Reader of messages.

@@ -84,36 +84,7 @@ pub fn fit(points: &[Point]) -> Option<AllanFit> {
         return None;
     }
     let problem = Problem::new(&points);
-    let mut allowed = [true; TERMS];
-    let full = problem.solve(allowed);
-    let full_error = problem.errors(&full, allowed);
-    let mut solution = full;
-    let mut error = full_error;
-    loop {
-        let weakest = (0..TERMS)
-            .filter(|&i| allowed[i])
-            .map(|i| {
-                (
-                    i,
-                    if solution[i] > 0.0 {
-                        solution[i] / error[i]
-                    } else {
-                        0.0
-                    },
-                )
-            })
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        match weakest {
-            Some((i, strength))
-                if strength < SEEN && allowed.iter().filter(|a| **a).count() > 1 =>
-            {
-                allowed[i] = false;
-                solution = problem.solve(allowed);
-                error = problem.errors(&solution, allowed);
-            }
-            _ => break,
-        }
-    }
+    let (allowed, solution, error) = problem.terms_seen();
     let term = |i: usize| {
         let scale = problem.scale[i];
         let seen = allowed[i] && solution[i] > 0.0;
@@ -159,6 +130,33 @@ struct Problem {
 }
 
 impl Problem {
+    /// Terms that are seen, their squared coefficients and errors: the weakest is left out until all that remain are seen.
+    fn terms_seen(&self) -> ([bool; TERMS], [f64; TERMS], [f64; TERMS]) {
+        let mut allowed = [true; TERMS];
+        let mut solution = self.solve(allowed);
+        let mut error = self.errors(&solution, allowed);
+        loop {
+            let strength = |i: usize| match solution[i] > 0.0 {
+                true => solution[i] / error[i],
+                false => 0.0,
+            };
+            let weakest = (0..TERMS)
+                .filter(|&i| allowed[i])
+                .map(|i| (i, strength(i)))
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            match weakest {
+                Some((i, strength))
+                    if strength < SEEN && allowed.iter().filter(|a| **a).count() > 1 =>
+                {
+                    allowed[i] = false;
+                    solution = self.solve(allowed);
+                    error = self.errors(&solution, allowed);
+                }
+                _ => return (allowed, solution, error),
+            }
+        }
+    }
+
     fn new(points: &[Point]) -> Problem {
         let mut scale = [f64::INFINITY; TERMS];
         for p in points {

@@ -186,15 +186,7 @@ impl GyroModel {
         if nanos <= 0 {
             return Err(MeasureError::Interval { from, to });
         }
-        let possible = truth
-            .rate
-            .iter()
-            .chain(truth.delta_angle.iter())
-            .chain(truth.specific_force.iter())
-            .chain(truth.sampled_force.iter())
-            .chain([&truth.temperature])
-            .all(|v| v.abs() <= FASTEST);
-        if !possible {
+        if !is_possible(truth) {
             return Err(MeasureError::Truth { to });
         }
         let secs = nanos as f64 * 1e-9;
@@ -272,19 +264,8 @@ impl GyroModel {
             rate.apply(|v| *v = v.clamp(-range, range));
         }
         let gyro = quantised(error, self.kind, &mut running.remainder, rate, secs);
-        let mut specific_force =
-            constants.accel_sensitivity * truth.sampled_force + constants.accel_bias;
-        if error.accel_noise > 0.0 {
-            specific_force += error.accel_noise / secs.sqrt() * vector(&mut self.acceleration);
-        }
-        let mut force_saturated = false;
-        if let Some(range) = error.accel_range {
-            force_saturated = specific_force.amax() > range;
-            specific_force.apply(|v| *v = v.clamp(-range, range));
-        }
-        if error.accel_lsb > 0.0 {
-            specific_force.apply(|v| *v = (*v / error.accel_lsb).round() * error.accel_lsb);
-        }
+        let (specific_force, force_saturated) =
+            accelerometer(error, constants, &mut self.acceleration, truth, secs);
         running.last = to;
         running.rate = truth.rate;
         running.force = truth.specific_force;
@@ -296,6 +277,40 @@ impl GyroModel {
             force_saturated,
         })
     }
+}
+
+/// Whether no number of the truth is beyond what any body does.
+fn is_possible(truth: &Truth) -> bool {
+    let rates = truth.rate.iter().chain(truth.delta_angle.iter());
+    let forces = truth
+        .specific_force
+        .iter()
+        .chain(truth.sampled_force.iter());
+    let mut all = rates.chain(forces).chain([&truth.temperature]);
+    all.all(|v| v.abs() <= FASTEST)
+}
+
+/// Specific force that is read over `secs`, m/s^2, and whether it was beyond the range.
+fn accelerometer(
+    error: &ImuError,
+    constants: &ConstantErrors,
+    noise: &mut [Stream; 3],
+    truth: &Truth,
+    secs: f64,
+) -> (Vector3<f64>, bool) {
+    let mut force = constants.accel_sensitivity * truth.sampled_force + constants.accel_bias;
+    if error.accel_noise > 0.0 {
+        force += error.accel_noise / secs.sqrt() * vector(noise);
+    }
+    let mut saturated = false;
+    if let Some(range) = error.accel_range {
+        saturated = force.amax() > range;
+        force.apply(|v| *v = v.clamp(-range, range));
+    }
+    if error.accel_lsb > 0.0 {
+        force.apply(|v| *v = (*v / error.accel_lsb).round() * error.accel_lsb);
+    }
+    (force, saturated)
 }
 
 /// Contribution of the non-linear terms.

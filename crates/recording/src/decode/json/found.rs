@@ -2,7 +2,7 @@
 
 use super::super::registers::{Form, Registers, Slot};
 use super::super::stamp::{self, Bare, from_decimal, from_rfc3339};
-use super::super::{Decoded, GyroUnit};
+use super::super::{Decoded, FieldRole, GyroUnit};
 use std::borrow::Cow;
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
@@ -128,6 +128,18 @@ impl<'a> Found<'a> {
 
     pub(crate) fn has_gyro(&self) -> bool {
         self.registers.has(Slot::GYRO, 3)
+    }
+
+    /// Whether the object has what fills the role.
+    pub(crate) fn has(&self, role: FieldRole) -> bool {
+        match role {
+            FieldRole::Gyro => self.has_gyro(),
+            FieldRole::Accel => self.registers.has(Slot::ACCEL, 3),
+            FieldRole::Mag => self.registers.has(Slot::MAG, 3),
+            FieldRole::Orientation => self.has_orientation(),
+            FieldRole::Stamp => self.stamp.is_some(),
+            FieldRole::Interval => self.registers.has(Slot::INTERVAL, 1),
+        }
     }
 
     /// Whether it is of an accelerometer or magnetometer that sends by itself.

@@ -305,15 +305,7 @@ impl<'a> Compiler<'a> {
                 })
             })
             .collect();
-        let emit = match self.batch.filter(|batch| batch.path == self.path) {
-            None => Emit::No,
-            Some(_) if self.plan.child.is_some() => Emit::FirstMatch,
-            Some(Batch {
-                element: Step::At(n),
-                ..
-            }) => Emit::At(*n),
-            Some(_) => Emit::Each,
-        };
+        let emit = self.emit();
         let count = match many {
             Many::Array(n) => Some(n),
             _ => None,
@@ -348,6 +340,25 @@ impl<'a> Compiler<'a> {
         }
         self.path.pop();
         self.flush();
+        self.close_loop(at, count, emit, name);
+        Ok(())
+    }
+
+    /// What a repetition at this path gives for a sample.
+    fn emit(&self) -> Emit {
+        match self.batch.filter(|batch| batch.path == self.path) {
+            None => Emit::No,
+            Some(_) if self.plan.child.is_some() => Emit::FirstMatch,
+            Some(Batch {
+                element: Step::At(n),
+                ..
+            }) => Emit::At(*n),
+            Some(_) => Emit::Each,
+        }
+    }
+
+    /// Completes the loop that begins at step `at`, now that its steps are known.
+    fn close_loop(&mut self, at: usize, count: Option<u32>, emit: Emit, name: u32) {
         let steps = self.plan.ops.get(at + 1..).unwrap_or(&[]);
         let min = least(steps);
         let body = steps.len() as u32;
@@ -377,7 +388,6 @@ impl<'a> Compiler<'a> {
         } else if let (Some(slot), Some(op)) = (self.plan.ops.get_mut(at), done) {
             *slot = op;
         }
-        Ok(())
     }
 
     /// Brings the position to a multiple of `to`, now if it is known, else during the walk.

@@ -282,42 +282,18 @@ impl<'a> Parser<'a> {
         if depth > MAX_DEPTH {
             return Err(format!("the schema nests types more than {MAX_DEPTH} deep"));
         }
-        let known = |kind| Written::Known(kind);
-        let number = |n| known(Kind::Number(n));
-        let written = match self.peek() {
-            "boolean" | "octet" | "char" | "uint8" => number(Number::U8),
-            "int8" => number(Number::I8),
-            "short" | "int16" => number(Number::I16),
-            "uint16" => number(Number::U16),
-            "int32" => number(Number::I32),
-            "uint32" => number(Number::U32),
-            "int64" => number(Number::I64),
-            "uint64" => number(Number::U64),
-            "float" => number(Number::F32),
-            "double" => number(Number::F64),
-            "wchar" => known(Kind::WideText),
-            "unsigned" => {
+        let one = |kind| Typed {
+            written: Written::Known(kind),
+            many: Many::One,
+        };
+        if let Some(number) = self.number() {
+            return Ok(one(Kind::Number(number)));
+        }
+        match self.peek() {
+            "wchar" => {
                 self.at += 1;
-                match (self.peek(), self.tokens.get(self.at + 1).copied()) {
-                    ("short", _) => number(Number::U16),
-                    ("long", Some("long")) => {
-                        self.at += 1;
-                        number(Number::U64)
-                    }
-                    _ => number(Number::U32),
-                }
+                Ok(one(Kind::WideText))
             }
-            "long" => match self.tokens.get(self.at + 1).copied() {
-                Some("long") => {
-                    self.at += 1;
-                    number(Number::I64)
-                }
-                Some("double") => {
-                    self.at += 1;
-                    number(Number::F128)
-                }
-                _ => number(Number::I32),
-            },
             text @ ("string" | "wstring") => {
                 self.at += 1;
                 self.bound()?;
@@ -326,10 +302,7 @@ impl<'a> Parser<'a> {
                 } else {
                     Kind::WideText
                 };
-                return Ok(Typed {
-                    written: known(kind),
-                    many: Many::One,
-                });
+                Ok(one(kind))
             }
             "sequence" => {
                 self.at += 1;
@@ -339,23 +312,45 @@ impl<'a> Parser<'a> {
                     self.at += 1;
                 }
                 self.expect(">")?;
-                return Ok(nested(element, Many::Sequence));
+                Ok(nested(element, Many::Sequence))
             }
             "map" | "any" | "fixed" => {
                 self.at += 1;
                 self.bound()?;
-                return Ok(Typed {
-                    written: known(Kind::Undefined),
-                    many: Many::One,
-                });
+                Ok(one(Kind::Undefined))
             }
-            _ => return self.scoped(),
+            _ => self.scoped(),
+        }
+    }
+
+    /// Takes the words of a number's type, where such stand here.
+    fn number(&mut self) -> Option<Number> {
+        let next = |n| self.tokens.get(self.at + n).copied();
+        let (number, words) = match self.peek() {
+            "boolean" | "octet" | "char" | "uint8" => (Number::U8, 1),
+            "int8" => (Number::I8, 1),
+            "short" | "int16" => (Number::I16, 1),
+            "uint16" => (Number::U16, 1),
+            "int32" => (Number::I32, 1),
+            "uint32" => (Number::U32, 1),
+            "int64" => (Number::I64, 1),
+            "uint64" => (Number::U64, 1),
+            "float" => (Number::F32, 1),
+            "double" => (Number::F64, 1),
+            "unsigned" => match (next(1), next(2)) {
+                (Some("short"), _) => (Number::U16, 2),
+                (Some("long"), Some("long")) => (Number::U64, 3),
+                _ => (Number::U32, 2),
+            },
+            "long" => match next(1) {
+                Some("long") => (Number::I64, 2),
+                Some("double") => (Number::F128, 2),
+                _ => (Number::I32, 1),
+            },
+            _ => return None,
         };
-        self.at += 1;
-        Ok(Typed {
-            written,
-            many: Many::One,
-        })
+        self.at += words;
+        Some(number)
     }
 
     /// `<...>`, gone over.

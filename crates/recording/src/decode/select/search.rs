@@ -60,30 +60,7 @@ pub(super) fn complete(
     });
     let chain = around.map_or_else(|| vec![Vec::new()], |path| structs_on(schema, &path));
     if selection.form.stamp == StampForm::None {
-        let mut found: Vec<StampFields> = chain
-            .iter()
-            .filter_map(|path| {
-                let structure = end_of(schema, path)?.structure(schema)?;
-                stamp_in(schema, path, structure, 2).map(|(_, stamp)| stamp)
-            })
-            .collect();
-        // The message's own first; but of a batch every sample has its own.
-        if selection.batch.is_none() {
-            found.reverse();
-        }
-        selection.stamps = found.iter().filter_map(|s| stamp_text(schema, s)).collect();
-        let wanted = options.nth_stamp.min(found.len().saturating_sub(1));
-        if let Some(mut stamp) = found.into_iter().nth(wanted) {
-            if px4.is_some() || selection.kind.is_some() {
-                stamp.form = px4_stamp(stamp.form);
-            }
-            if let Some((path, _)) = stamp.paths.first() {
-                // Of `stamp.sec` only `stamp` is worth saying.
-                let whole = path.len() - usize::from(stamp.paths.len() > 1);
-                selection.describe(FieldRole::Stamp, schema, path.get(..whole).unwrap_or(path));
-            }
-            take_stamp(selection, stamp);
-        }
+        find_stamp(schema, &chain, options.nth_stamp, px4.is_some(), selection);
     }
     selection.frame = chain
         .iter()
@@ -93,6 +70,41 @@ pub(super) fn complete(
         element.push(Step::Each);
         selection.child = text_near(schema, &element, "child_frame_id");
     }
+}
+
+/// Selects the stamp, of all on the way to the vector the `nth`.
+fn find_stamp(
+    schema: &Schema,
+    chain: &[Vec<Step>],
+    nth: usize,
+    is_px4: bool,
+    selection: &mut Selection,
+) {
+    let mut found: Vec<StampFields> = chain
+        .iter()
+        .filter_map(|path| {
+            let structure = end_of(schema, path)?.structure(schema)?;
+            stamp_in(schema, path, structure, 2).map(|(_, stamp)| stamp)
+        })
+        .collect();
+    // The message's own first; but of a batch every sample has its own.
+    if selection.batch.is_none() {
+        found.reverse();
+    }
+    selection.stamps = found.iter().filter_map(|s| stamp_text(schema, s)).collect();
+    let nth = nth.min(found.len().saturating_sub(1));
+    let Some(mut stamp) = found.into_iter().nth(nth) else {
+        return;
+    };
+    if is_px4 || selection.kind.is_some() {
+        stamp.form = px4_stamp(stamp.form);
+    }
+    if let Some((path, _)) = stamp.paths.first() {
+        // Of `stamp.sec` only `stamp` is worth saying.
+        let whole = path.len() - usize::from(stamp.paths.len() > 1);
+        selection.describe(FieldRole::Stamp, schema, path.get(..whole).unwrap_or(path));
+    }
+    take_stamp(selection, stamp);
 }
 
 /// Path of the stamp for the user: `stamp` instead of `stamp.sec`.
@@ -276,24 +288,23 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
         let own = vector(schema, &site.path, end, 0);
         list.extend(own.map(|v| candidate(Found::Named, 0, v, Vec::new(), None, false)));
     }
-    if let [Some(x), Some(y), Some(z)] = axes {
-        let whole = x.1.clone();
+    if let [Some((rank, x, unit)), Some((_, y, _)), Some((_, z, _))] = axes {
+        let whole = x.clone();
         list.push(candidate(
             Found::Named,
-            x.0,
-            vec![x.1, y.1, z.1],
+            rank,
+            vec![x, y, z],
             whole,
-            x.2,
+            unit,
             false,
         ));
     }
     list
 }
 
-/// Selects what stands in the same struct as the body rate.
-fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Selection) {
-    // The struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`, the outermost in
-    // which the rest of the path is still a vector.
+/// Struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`, the outermost in which the rest of the path is
+/// still a vector.
+fn holder_of(schema: &Schema, gyro: &[Step]) -> Option<Vec<Step>> {
     let named_in = |path: &Vec<Step>| {
         let Some(Step::Field(next)) = gyro.get(path.len()) else {
             return false;
@@ -308,8 +319,14 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
             vector(schema, &with(path, Step::Field(*next)), End::from(field), 2).is_some();
         own_axis || is_vector
     };
-    let site = structs_on(schema, gyro).into_iter().rfind(named_in);
-    let Some(site) = site else { return };
+    structs_on(schema, gyro).into_iter().rfind(named_in)
+}
+
+/// Selects what stands in the same struct as the body rate.
+fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Selection) {
+    let Some(site) = holder_of(schema, gyro) else {
+        return;
+    };
     let Some(structure) = end_of(schema, &site).and_then(|e| e.structure(schema)) else {
         return;
     };
@@ -394,6 +411,10 @@ fn find_alone(
     selection: &mut Selection,
 ) -> Option<Vec<Step>> {
     let (role, slot) = wanted.vector();
+    let mark = match wanted {
+        Wanted::Forces => Slot::ACCEL_MARK,
+        _ => Slot::MAG_MARK,
+    };
     let is_root = matches!(
         (px4, wanted),
         (Some(Px4::SensorAccel), Wanted::Forces) | (Some(Px4::SensorMag), Wanted::Fields)
@@ -419,12 +440,13 @@ fn find_alone(
                 }
                 (Some(Meaning::AccelAxis { axis }), Wanted::Forces)
                 | (Some(Meaning::MagAxis { axis }), Wanted::Fields) => axis,
-                _ if is_root && site.depth == 0 => match field.name.as_str() {
-                    "x" => 0,
-                    "y" => 1,
-                    "z" => 2,
-                    _ => continue,
-                },
+                _ if is_root && site.depth == 0 => {
+                    let Some(axis) = ["x", "y", "z"].iter().position(|axis| field.name == *axis)
+                    else {
+                        continue;
+                    };
+                    axis as u8
+                }
                 _ => continue,
             };
             if let (Some(place), Some(_)) =
@@ -436,23 +458,19 @@ fn find_alone(
         if let [Some(x), Some(y), Some(z)] = axes {
             found = found.or(Some((vec![x.clone(), y, z], x, None)));
         }
-        if let Some((paths, whole, marked)) = found {
-            selection.found = Found::Named;
-            selection.holder = structure.name.clone();
-            selection.batch = paths.first().and_then(|path| batch_of(schema, path));
-            selection.describe(role, schema, &whole);
-            if let Some(field) = marked {
-                let mark = if wanted == Wanted::Forces {
-                    Slot::ACCEL_MARK
-                } else {
-                    Slot::MAG_MARK
-                };
-                take_mark(structure, field, &site.path, mark, selection);
-            }
-            let first = paths.first().cloned();
-            selection.take(paths, slot);
-            return first;
+        let Some((paths, whole, marked)) = found else {
+            continue;
+        };
+        selection.found = Found::Named;
+        selection.holder = structure.name.clone();
+        selection.batch = paths.first().and_then(|path| batch_of(schema, path));
+        selection.describe(role, schema, &whole);
+        if let Some(field) = marked {
+            take_mark(structure, field, &site.path, mark, selection);
         }
+        let first = paths.first().cloned();
+        selection.take(paths, slot);
+        return first;
     }
     None
 }

@@ -222,31 +222,42 @@ impl Roles<'_> {
                 "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
                 self.reference(at)
             ))),
-            _ => match unit_of(stamps.iter().copied()) {
-                Ok(unit) => Ok(of(unit.nanos(0.0) as f64)),
-                Err(_) if stamps.is_empty() => Ok(of(1.0)),
-                Err(why) => {
-                    let first = stamps.first().map_or(0.0, |bare| bare.count());
-                    let by_size = TimeUnit::of_magnitude(first);
-                    let fits = units_that_fit(stamps.iter().copied());
-                    if fits.is_some_and(|(_, fits)| !fits.contains(&by_size)) {
-                        return Err(Diagnostic::new(format!("`{text}`: {}", why.what())).help(
-                            format!(
-                                "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
-                                self.reference(at)
-                            ),
-                        ));
-                    }
-                    let mut stamp = of(by_size.nanos(first) as f64);
-                    stamp.note = Some(format!(
-                        "the unit of the stamps in `{text}` is not stated; by their size they are taken for {}: {COLUMNS} stamp={}:ms says otherwise",
-                        by_size.name(),
-                        self.reference(at)
-                    ));
-                    Ok(stamp)
-                }
-            },
+            _ => {
+                let (nanos, note) = self.unit_by_size(at, text, &stamps)?;
+                Ok(Stamp { note, ..of(nanos) })
+            }
         }
+    }
+
+    /// Nanoseconds of a count in a column that states no unit, and what is to be said of the guess.
+    fn unit_by_size(
+        &self,
+        at: usize,
+        text: &str,
+        stamps: &[Bare],
+    ) -> Result<(f64, Option<String>), Diagnostic> {
+        let why = match unit_of(stamps.iter().copied()) {
+            Ok(unit) => return Ok((unit.nanos(0.0) as f64, None)),
+            Err(_) if stamps.is_empty() => return Ok((1.0, None)),
+            Err(why) => why,
+        };
+        let first = stamps.first().map_or(0.0, |bare| bare.count());
+        let by_size = TimeUnit::of_magnitude(first);
+        let fits = units_that_fit(stamps.iter().copied());
+        if fits.is_some_and(|(_, fits)| !fits.contains(&by_size)) {
+            return Err(
+                Diagnostic::new(format!("`{text}`: {}", why.what())).help(format!(
+                    "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
+                    self.reference(at)
+                )),
+            );
+        }
+        let note = format!(
+            "the unit of the stamps in `{text}` is not stated; by their size they are taken for {}: {COLUMNS} stamp={}:ms says otherwise",
+            by_size.name(),
+            self.reference(at)
+        );
+        Ok((by_size.nanos(first) as f64, Some(note)))
     }
 
     /// A unit that the name states, and the steps deny.

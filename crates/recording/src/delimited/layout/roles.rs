@@ -3,6 +3,7 @@
 use super::super::column::Column;
 use super::super::preamble::{Maker, Preamble};
 use super::super::rows::{Scales, Table};
+use super::instants::Instants;
 use super::{columns, is_number, number};
 use crate::columns::Delimiter;
 use crate::columns::Unit;
@@ -39,8 +40,16 @@ pub(super) struct Chosen {
     pub(super) unit: Option<Unit>,
 }
 
-/// A role, the columns that fill it, and what each of them is.
-type Filled<'c> = (&'c Option<Chosen>, Kind, fn(usize) -> Column);
+/// Roles of a table with the columns that fill them.
+struct Fillings {
+    gyro: Option<Chosen>,
+    accel: Option<Chosen>,
+    mag: Option<Chosen>,
+    orientation: Option<Chosen>,
+    matrix: Option<Chosen>,
+    turn: Option<Chosen>,
+    push: Option<Chosen>,
+}
 
 /// Index of a column that the user names, or gives by its number from 1.
 pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
@@ -119,6 +128,52 @@ pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<us
     ["x", "y", "z"].into_iter().map(axis).collect()
 }
 
+impl Fillings {
+    /// Each role with its columns, and what a column of it is by its part.
+    fn each(&self) -> [(Option<&Chosen>, Kind, fn(usize) -> Column); 7] {
+        [
+            (self.gyro.as_ref(), Kind::Gyro, Column::Gyro),
+            (self.accel.as_ref(), Kind::Accel, Column::Accel),
+            (self.mag.as_ref(), Kind::Mag, Column::Mag),
+            (
+                self.orientation.as_ref(),
+                Kind::Orientation,
+                Column::Orientation,
+            ),
+            (self.matrix.as_ref(), Kind::Matrix, Column::Matrix),
+            (self.turn.as_ref(), Kind::Turn, Column::Turn),
+            (self.push.as_ref(), Kind::Push, Column::Accel),
+        ]
+    }
+
+    /// States units and factors of the columns in the table; `period` is the time from row to row in ns.
+    fn declare_units(&self, table: &mut Table, period: Option<i64>) {
+        let unit = |chosen: &Option<Chosen>| chosen.as_ref().and_then(|chosen| chosen.unit);
+        let mut scales = Scales::default();
+        if let Some(Unit::Rate(unit, scale)) = unit(&self.gyro) {
+            table.declared.gyro_unit = Some(unit);
+            scales.gyro = scale;
+        }
+        if let Some(Unit::Force(unit, scale)) = unit(&self.accel) {
+            table.declared.accel_unit = Some(unit);
+            scales.accel = scale;
+        }
+        if let (Some(_), Some(period)) = (&self.push, period) {
+            table.declared.accel_unit = Some(AccelUnit::MetresPerSecondSquared);
+            scales.accel = 1e9 / period as f64;
+        }
+        if self.turn.is_some() {
+            table.declared.sample_kind = Some(SampleKind::Rotation);
+            table.declared.gyro_unit = Some(GyroUnit::Rad);
+            table.interval = period;
+        }
+        if let Some(Unit::Field(scale)) = unit(&self.mag) {
+            scales.mag = scale;
+        }
+        table.scales = scales;
+    }
+}
+
 impl Roles<'_> {
     /// The table.
     ///
@@ -156,18 +211,43 @@ impl Roles<'_> {
             None => self.push(period, &mut notes)?,
             Some(_) => None,
         };
+        let fillings = Fillings {
+            gyro,
+            accel,
+            mag,
+            orientation,
+            matrix,
+            turn,
+            push,
+        };
+        let (of, assumed) = self.placed(&fillings, &instants)?;
+        let mut table = Table::of_columns(header, columns(self.names, &of), delimiter);
+        table.clock = instants.clock;
+        notes.extend(instants.notes);
+        table.has_decimal_comma = self.has_decimal_comma(&of);
+        fillings.declare_units(&mut table, period);
+        if let Some(axes) = &self.preamble.orientation {
+            notes.push(format!(
+                "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
+            ));
+        }
+        table.assumed = assumed.join(",");
+        table.notes = notes;
+        Ok(table)
+    }
+
+    /// Column of each role, and the words that would give them so.
+    ///
+    /// # Errors
+    /// A column that fills two roles.
+    fn placed(
+        &self,
+        fillings: &Fillings,
+        instants: &Instants,
+    ) -> Result<(Vec<(usize, Column)>, Vec<String>), Diagnostic> {
         let mut of: Vec<(usize, Column)> = Vec::new();
-        let roles: [Filled<'_>; 7] = [
-            (&gyro, Kind::Gyro, Column::Gyro),
-            (&accel, Kind::Accel, Column::Accel),
-            (&mag, Kind::Mag, Column::Mag),
-            (&orientation, Kind::Orientation, Column::Orientation),
-            (&matrix, Kind::Matrix, Column::Matrix),
-            (&turn, Kind::Turn, Column::Turn),
-            (&push, Kind::Push, Column::Accel),
-        ];
         let mut assumed = Vec::new();
-        for (chosen, kind, column) in roles {
+        for (chosen, kind, column) in fillings.each() {
             let Some(chosen) = chosen else {
                 let given = self.given_of(Role::Of(kind));
                 if given.is_some_and(|given| given.columns.is_empty()) {
@@ -201,40 +281,7 @@ impl Roles<'_> {
                     .help(format!("{COLUMNS} gives each its own")),
             );
         }
-        let mut table = Table::of_columns(header, columns(self.names, &of), delimiter);
-        table.clock = instants.clock;
-        notes.extend(instants.notes);
-        table.has_decimal_comma = self.has_decimal_comma(&of);
-        let mut scales = Scales::default();
-        if let Some(Unit::Rate(unit, scale)) = gyro.and_then(|gyro| gyro.unit) {
-            table.declared.gyro_unit = Some(unit);
-            scales.gyro = scale;
-        }
-        if let Some(Unit::Force(unit, scale)) = accel.and_then(|accel| accel.unit) {
-            table.declared.accel_unit = Some(unit);
-            scales.accel = scale;
-        }
-        if let (Some(_), Some(period)) = (&push, period) {
-            table.declared.accel_unit = Some(AccelUnit::MetresPerSecondSquared);
-            scales.accel = 1e9 / period as f64;
-        }
-        if turn.is_some() {
-            table.declared.sample_kind = Some(SampleKind::Rotation);
-            table.declared.gyro_unit = Some(GyroUnit::Rad);
-            table.interval = period;
-        }
-        if let Some(Unit::Field(scale)) = mag.and_then(|mag| mag.unit) {
-            scales.mag = scale;
-        }
-        if let Some(axes) = &self.preamble.orientation {
-            notes.push(format!(
-                "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
-            ));
-        }
-        table.scales = scales;
-        table.assumed = assumed.join(",");
-        table.notes = notes;
-        Ok(table)
+        Ok((of, assumed))
     }
 
     pub(super) fn given_of(&self, role: Role) -> Option<&Given> {
