@@ -270,7 +270,7 @@ impl Preparation {
         if let (Some(left), Bias::Auto) = (&mut bias_left, plan.bias) {
             // Rests that differ tell it no better than that.
             *left = left.hypot(bias_sigma.max());
-            if told.can_be_turns() {
+            if told.can_be_a_turn() {
                 bias_origin += " (or a steady turn about the vertical: nothing here can tell)";
             }
             if is_bias_unsaid {

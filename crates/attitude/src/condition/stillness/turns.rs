@@ -48,10 +48,10 @@ impl Rest {
 }
 
 impl Rests {
-    /// Whether every one of them can be a steady turn: an accelerometer cannot tell.
+    /// Whether there is one alone, and it can be a steady turn: an accelerometer cannot tell.
     #[must_use]
-    pub fn can_be_turns(&self) -> bool {
-        !self.kept.is_empty() && self.kept.iter().all(|rest| rest.turn().is_some())
+    pub fn can_be_a_turn(&self) -> bool {
+        matches!(self.kept.as_slice(), [only] if only.turn().is_some())
     }
 
     /// The rests that can be no steady turn of a body whose gyro's bias is `class` (one sigma, rad/s), and what to say
