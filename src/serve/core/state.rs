@@ -14,6 +14,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Memory;
+use strapd_attitude::plausible::{LARGEST, is_covariance, is_unit};
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
@@ -23,12 +24,7 @@ use strapd_recording::text::printable;
 pub(in crate::serve) const FORMAT: u32 = 2;
 /// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
-/// Largest variance, rad^2: an attitude of which nothing is known has pi^2 about each axis.
-const MAX_VARIANCE: f64 = 1e3;
-/// Rounding of a variance of nothing.
-const ROUNDING: f64 = 1e-12;
-/// Largest rate, rad/s.
-const MAX_RATE: f64 = 1e9;
+
 /// The last attitude of a sensor, and between which axes it is.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Saved {
@@ -148,23 +144,13 @@ impl Saved {
     /// # Errors
     /// In words: what cannot be.
     pub(in crate::serve) fn check(&self) -> std::result::Result<(), String> {
-        let norm = self.q.iter().map(|c| c * c).sum::<f64>().sqrt();
-        if (norm - 1.0).abs() > 1e-6 {
+        if !is_unit(&self.q) {
             return Err("`q` is no unit quaternion".to_owned());
         }
-        let [xx, xy, xz, yy, yz, zz] = self.covariance;
-        let is_variance = |v: f64| (-ROUNDING..=MAX_VARIANCE).contains(&v);
-        let is_within = |both: f64, a: f64, b: f64| {
-            both.powi(2) <= a.max(0.0) * b.max(0.0) * (1.0 + 1e-6) + ROUNDING
-        };
-        let is_covariance = [xx, yy, zz].into_iter().all(is_variance)
-            && is_within(xy, xx, yy)
-            && is_within(xz, xx, zz)
-            && is_within(yz, yy, zz);
-        if !is_covariance {
+        if !is_covariance(&self.covariance) {
             return Err("`covariance` is none".to_owned());
         }
-        if !self.rate.iter().all(|rate| rate.abs() <= MAX_RATE) {
+        if !self.rate.iter().all(|rate| rate.abs() <= LARGEST) {
             return Err("`rate` is none".to_owned());
         }
         match self.memory().is_none_or(Memory::is_plausible) {
@@ -395,9 +381,9 @@ mod tests {
         }
     }
 
-    /// A daemon that goes on from these for five seconds of samples; how uncertain the last attitude is, as a client
+    /// A daemon that goes on from these with samples at these hundredths of a second; how uncertain the last attitude is, as a client
     /// is told.
-    fn gone_on(saved: Sensors, from: u64) -> (Sensors, Value) {
+    fn gone_on(saved: Sensors, samples: impl Iterator<Item = u64>) -> (Sensors, Value) {
         let settings = Settings {
             saved,
             plan: Plan {
@@ -409,7 +395,7 @@ mod tests {
         let hub = Arc::new(Hub::new(settings).unwrap());
         let mut session = Session::new(&hub, "sender".to_owned(), true);
         let mut scratch = Scratch::default();
-        for n in from..from + 500 {
+        for n in samples {
             let (secs, nanos) = (1_700_000_000 + n / 100, n % 100 * 10_000_000);
             let line = format!(
                 "{{\"id\":\"imu\",\"stamp\":{{\"sec\":{secs},\"nsec\":{nanos}}},\"gyro\":[0.01,-0.02,0.{n:03}],\"accel\":[0.1,0.2,9.8],\"mag\":[20,5,-40]}}\n",
@@ -463,7 +449,7 @@ mod tests {
 
     #[test]
     fn a_number_that_cannot_be_is_refused_or_does_no_lasting_harm() {
-        let (sensors, sigma) = gone_on(Sensors::new(), 0);
+        let (sensors, sigma) = gone_on(Sensors::new(), 0..500);
         assert!(sigma["tilt"].is_f64(), "{sigma}");
         let text = serde_json::to_value(&sensors).unwrap();
         let (mut refused, mut taken, mut harmed) = (0, 0, Vec::new());
@@ -477,7 +463,7 @@ mod tests {
                 return;
             }
             taken += 1;
-            let (after, sigma) = gone_on(sensors, 500);
+            let (after, sigma) = gone_on(sensors, 500..1000);
             let is_known = |name: &str| {
                 let sigma = sigma[name].as_f64();
                 sigma.is_some_and(|s| (0.0..1e3).contains(&s))
@@ -494,6 +480,16 @@ mod tests {
         other["imu"]["covariance"][0] = (-1e308).into();
         let why = check(&serde_json::from_value(other).unwrap()).unwrap_err();
         assert_eq!(why, "sensor imu: `covariance` is none");
+    }
+
+    /// Each pause of half a minute adds 3 rad^2 to what is unknown of the heading.
+    #[test]
+    fn a_sensor_that_was_away_often_is_saved_all_the_same() {
+        let paused = (0..4000).map(|n| n + n / 20 * 3000);
+        let (sensors, _) = gone_on(Sensors::new(), paused);
+        let heading = sensors["imu"].covariance[5];
+        assert!(heading > 1000.0, "{heading}");
+        assert_eq!(check(&sensors), Ok(()));
     }
 
     #[test]
