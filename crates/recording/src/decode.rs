@@ -130,7 +130,7 @@ impl Options {
 
     /// Whether the user says where the samples' own interval lies, and in which unit.
     #[must_use]
-    pub fn states_interval_unit(&self) -> bool {
+    pub(crate) fn states_interval_unit(&self) -> bool {
         let mut fields = self.fields.iter();
         fields.any(|f| f.role == FieldRole::Interval && f.unit.is_some())
     }
@@ -385,7 +385,7 @@ impl Decoder {
     ///
     /// # Errors
     /// As [`Decoder::decode`].
-    pub fn decode_of(
+    pub(crate) fn decode_of(
         &self,
         frame: &str,
         payload: &[u8],
@@ -437,7 +437,7 @@ impl Decoder {
     /// Whether the stamp that is read is one: not zero, not shared by many samples, not in whole seconds
     /// throughout. `first` are the first messages of the channel, with their log times.
     #[must_use]
-    pub fn has_good_stamps(&self, first: &[(Nanos, Vec<u8>)]) -> bool {
+    pub(crate) fn has_good_stamps(&self, first: &[(Nanos, Vec<u8>)]) -> bool {
         let mut samples = Vec::new();
         for (log, payload) in first {
             // What cannot be decoded says nothing about stamps.
@@ -466,7 +466,7 @@ impl Decoder {
 
     /// Whether messages may name a frame.
     #[must_use]
-    pub fn names_frames(&self) -> bool {
+    pub(crate) fn names_frames(&self) -> bool {
         self.frame.is_some() || matches!(self.plan, Plan::Json(_))
     }
 

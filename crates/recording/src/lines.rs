@@ -166,15 +166,6 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// Whether the lines may hold orientations: of a table it is known.
-    #[must_use]
-    pub fn may_have_orientations(&self) -> bool {
-        match &self.form {
-            Form::Objects(..) => true,
-            Form::Rows(table) => table.has_orientation(),
-        }
-    }
-
     /// The table that the lines are rows of.
     #[must_use]
     pub fn table(&self) -> Option<&Table> {

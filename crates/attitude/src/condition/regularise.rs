@@ -357,7 +357,7 @@ impl Regulariser {
 
     /// Whether nothing waits.
     #[must_use]
-    pub fn is_causal(&self) -> bool {
+    pub(crate) fn is_causal(&self) -> bool {
         matches!(self.how, How::Causal { .. })
     }
 

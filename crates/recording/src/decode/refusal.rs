@@ -37,7 +37,7 @@ impl Unsupported {
     /// Whether nothing says what its messages hold, so that no field of them has a name. Those of `std_msgs` have none
     /// that could be a rate.
     #[must_use]
-    pub fn is_undefined(&self) -> bool {
+    pub(crate) fn is_undefined(&self) -> bool {
         self.why == UNDEFINED && !self.type_name.starts_with("std_msgs/")
     }
 }

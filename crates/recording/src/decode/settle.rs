@@ -48,7 +48,7 @@ impl Decoder {
     ///
     /// # Errors
     /// [`Unsupported`] where that tells none, or several: with what is known, and the flag that states it.
-    pub fn settle_unit(&mut self, first: &[(Nanos, Vec<u8>)]) -> Result<(), Unsupported> {
+    pub(crate) fn settle_unit(&mut self, first: &[(Nanos, Vec<u8>)]) -> Result<(), Unsupported> {
         if !self.has_bare_stamps {
             return Ok(());
         }

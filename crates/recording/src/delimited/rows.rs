@@ -89,7 +89,7 @@ pub struct Table {
 impl Table {
     /// Whether a line names the columns of a table of strapd's own.
     #[must_use]
-    pub fn is_own_header(line: &[u8]) -> bool {
+    pub(crate) fn is_own_header(line: &[u8]) -> bool {
         Table::own(line).is_ok()
     }
 
@@ -184,7 +184,7 @@ impl Table {
 
     /// Warning to give if nobody states the unit of its rates.
     #[must_use]
-    pub fn doubt_of_unit(&self) -> Option<String> {
+    pub(crate) fn doubt_of_unit(&self) -> Option<String> {
         let is_open = !self.is_own() && self.has_rate() && self.declared.gyro_unit.is_none();
         is_open.then(|| {
             format!("the unit of the rates is not stated, and taken for rad/s: {GYRO_UNIT} deg, if it is deg/s")
@@ -199,14 +199,8 @@ impl Table {
 
     /// Whether anything says when its rows were measured.
     #[must_use]
-    pub fn has_stamps(&self) -> bool {
+    pub(crate) fn has_stamps(&self) -> bool {
         self.clock != Clock::Nothing
-    }
-
-    /// Whether rows have a place for an orientation.
-    #[must_use]
-    pub fn has_orientation(&self) -> bool {
-        self.has(ORIENTATION[0]) || self.has(Column::Matrix(0))
     }
 
     /// Whether rows have a place for a rate.

@@ -65,7 +65,7 @@ impl Bare {
 
     /// Instant read by its magnitude alone, if nobody has more than this one.
     #[must_use]
-    pub fn by_magnitude(self) -> Nanos {
+    pub(crate) fn by_magnitude(self) -> Nanos {
         self.in_unit(TimeUnit::of_magnitude(self.count()))
     }
 
