@@ -16,9 +16,8 @@ pub mod zenoh;
 use crate::serve::core::outgoing::Outgoing;
 use crate::serve::guard::log_throttle;
 use crate::serve::protocol::chunk::Chunk;
-use crate::serve::protocol::upstream::{self, Event};
 use bytes::{Bytes, BytesMut};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A longer payload is refused: what brokers allow by themselves.
@@ -40,17 +39,6 @@ fn lost(outgoing: &Outgoing, why: &str) {
 fn warn(name: &str, why: &str) {
     let name = format!("-o {name}");
     log_throttle::warn(&name, &format!("{name}: {why}; trying again"));
-}
-
-/// The first error among what a session was to tell, and in words.
-fn complaint(said: &VecDeque<Bytes>) -> Option<(&Bytes, String)> {
-    let error = said
-        .iter()
-        .find(|line| line.starts_with(br#"{"class":"ERROR""#))?;
-    match upstream::read(error) {
-        Some(Event::Complained(what)) => Some((error, what)),
-        _ => None,
-    }
 }
 
 /// Attitudes that one sensor has to publish.

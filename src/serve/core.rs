@@ -1,4 +1,4 @@
-//! What clients say -> sensors -> what clients get: the daemon without a socket. Locks; sans-I/O.
+//! Words of clients -> sensors -> attitudes for clients: the daemon without a socket. Locks; sans-I/O.
 //!
 //! | file | arrow | |
 //! |---|---|---|
@@ -6,6 +6,7 @@
 //! | [`viewer`] | the same for Foxglove's viewers: messages in place of lines | sans-I/O |
 //! | `owned` | the sensors one client sends -> hub, and again when they were put away | locks |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
+//! | `run_builder` | lines of one sensor -> a run of its samples | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
 //! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
 //! | [`outbox`] | attitudes -> what one client gets, bounded | locks |
@@ -24,6 +25,7 @@ pub(super) mod outgoing;
 pub(super) mod owned;
 pub(super) mod read_buffer;
 pub mod recorder;
+pub(super) mod run_builder;
 pub mod session;
 pub mod state;
 pub mod stream;

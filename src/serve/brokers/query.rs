@@ -14,7 +14,7 @@ const MAX_BYTES: usize = 2048;
 
 /// Words in which an address is refused: where it stands, what it is, and what would do.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Refusal<'a> {
+pub(in crate::serve) struct Refusal<'a> {
     /// `serve` or `-o`.
     pub(in crate::serve) before: &'a str,
     /// The address as it was given.

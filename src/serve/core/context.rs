@@ -1,4 +1,4 @@
-//! What every task of a listener, a source or an output needs.
+//! Hub, places and the way to the end, as every task of a listener, a source or an output needs them.
 
 use super::hub::Hub;
 use crate::serve::guard::admission::Web;

@@ -7,6 +7,7 @@
 
 mod announce;
 mod back_pressure;
+mod complaints;
 mod counters;
 mod latecomers;
 mod places;
@@ -16,15 +17,18 @@ mod report;
 mod resetting;
 mod saving;
 mod settings;
+mod tables;
 
 pub use back_pressure::Flood;
+pub use complaints::Complaint;
+use complaints::Complaints;
 pub use counters::{Counters, count};
-use places::Absent;
 pub use places::TICK;
 use polling::Polling;
 use report::StateStatus;
 pub use resetting::Asker;
 pub use settings::Settings;
+use tables::{ChannelTable, ClientTable, SensorTable, Simulation};
 
 use super::channel::{Channel, Items};
 use super::outbox::Outbox;
@@ -35,7 +39,7 @@ use super::stream::stamps::Taken;
 use super::stream::{Fate, SensorStream, live_plan};
 use crate::error::{Error, Result};
 use crate::serve::guard::admission::Token;
-use crate::serve::guard::fault::Fault;
+use crate::serve::guard::fault::{Fault, Kind};
 use crate::serve::guard::limits::Limits;
 use crate::serve::guard::log_throttle;
 use crate::serve::guard::losses::{Losses, Lost};
@@ -43,70 +47,37 @@ use crate::serve::guard::peer::Peer;
 use crate::serve::guard::places::Guest;
 use crate::serve::protocol::chunk::Chunk;
 use crate::serve::protocol::foxglove;
-use crate::serve::protocol::position::Timeline;
 use crate::serve::protocol::wire;
-use crate::sink::{ChildFrames, Profile};
+use crate::sink::Profile;
 use bytes::Bytes;
-use std::collections::{BTreeMap, VecDeque};
 use std::hash::{BuildHasher, RandomState};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
-use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::packed::Form;
 use strapd_recording::decode::{self, LineDecoder, exact_name};
 use strapd_recording::text::printable;
-use tokio::sync::Notify;
-
-/// The fault of samples that came when their sensor had just given way.
-pub const GAVE_WAY: &str = "gave_way";
 
 /// The middle of the daemon.
 #[derive(Debug)]
 pub struct Hub {
-    plan: Plan,
-    /// Plans of sensors that have their own, by `id`.
-    plans: BTreeMap<String, Plan>,
+    sensors: SensorTable,
+    clients: ClientTable,
+    channels: ChannelTable,
+    simulation: Simulation,
     decoder: LineDecoder,
     decode_options: decode::Options,
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
-    /// Timeline of the replay it serves, which is then its only source.
-    timeline: Option<Arc<dyn Timeline>>,
-    /// Samples can be watched, too.
-    brings_samples: bool,
     outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
     stopping: AtomicBool,
-    sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
-    clients: RwLock<BTreeMap<u64, Arc<Client>>>,
-    watchers: RwLock<Arc<[Arc<Client>]>>,
-    /// A watcher has room again.
-    room_made: Arc<Notify>,
-    /// Attitudes of sensors that are not there.
-    saved: Mutex<Absent>,
-    /// Sensors that gave way last.
-    gave_way: Mutex<VecDeque<Arc<str>>>,
-    /// Counts what is heard of sensors.
-    heard: AtomicU64,
-    /// Counts the calls of [`Hub::forget_silent`].
-    tick: AtomicU64,
     /// Outcome of saving attitudes the last time; `None` when they are not saved.
     state: Mutex<Option<StateStatus>>,
-    /// Channels by number.
-    channels: RwLock<BTreeMap<u32, Arc<Channel>>>,
-    next_channel: AtomicU32,
-    /// Child frames of the transforms of all channels.
-    child_frames: Mutex<ChildFrames>,
     polling: Polling,
-    /// True attitude by a simulation.
-    truth: Mutex<Option<referring::Truth>>,
-    next_client: AtomicU64,
-    /// Some sensor's samples wait for the unit of their stamps.
-    stamps_wait: AtomicBool,
     /// Streams of which nothing is used.
     pub(in crate::serve) losses: Losses,
     /// Counters.
@@ -158,6 +129,7 @@ pub struct Client {
     sensors: AtomicUsize,
     /// Whether it speaks for many: as many as there may be are its share.
     is_broker: AtomicBool,
+    complaints: Complaints,
 }
 
 /// Answers to a sender about its samples.
@@ -222,35 +194,25 @@ impl Hub {
         // No secret: it only tells a reader that the daemon was restarted.
         let session = RandomState::new().hash_one(std::process::id()) as u32;
         Ok(Hub {
+            sensors: SensorTable::new(plan, plans, settings.saved),
+            clients: ClientTable::default(),
+            channels: ChannelTable::default(),
+            simulation: Simulation {
+                timeline: settings.timeline,
+                brings_samples: settings.brings_samples,
+                truth: Mutex::default(),
+            },
             decoder: LineDecoder::new(&settings.decode).with_besides(),
             decode_options: settings.decode,
-            plan,
-            plans,
             limits: settings.limits,
             token: settings.token,
             recorder: settings.recorder,
-            timeline: settings.timeline,
-            brings_samples: settings.brings_samples,
             outgoing: Vec::new(),
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
-            sensors: RwLock::default(),
-            clients: RwLock::default(),
-            watchers: RwLock::new(Arc::from([])),
-            room_made: Arc::default(),
-            saved: Mutex::new(Absent::new(settings.saved)),
-            gave_way: Mutex::default(),
-            heard: AtomicU64::new(0),
-            tick: AtomicU64::new(0),
             state: Mutex::default(),
-            channels: RwLock::default(),
-            truth: Mutex::default(),
-            next_channel: AtomicU32::new(1),
-            child_frames: Mutex::default(),
             polling: Polling::default(),
-            next_client: AtomicU64::new(1),
-            stamps_wait: AtomicBool::new(false),
             losses: Losses::default(),
             counters: Counters::default(),
         })
@@ -260,10 +222,6 @@ impl Hub {
     #[must_use]
     pub fn fed_by(self, outgoing: Vec<Arc<Outgoing>>) -> Hub {
         Hub { outgoing, ..self }
-    }
-
-    fn plan_of(&self, id: &str) -> &Plan {
-        self.plans.get(id).unwrap_or(&self.plan)
     }
 
     /// The bounds.
@@ -299,7 +257,7 @@ impl Hub {
     /// Names this run of the daemon; a replay that begins anew gets another name.
     #[must_use]
     pub fn session(&self) -> String {
-        match self.timeline.as_ref().map_or(0, |t| t.run()) {
+        match self.simulation.timeline.as_ref().map_or(0, |t| t.run()) {
             0 => self.session.clone(),
             run => format!("{}.{run}", self.session),
         }
@@ -331,8 +289,8 @@ impl Hub {
             ClientProtocol::Messages => Outbox::saying(|_, _| Bytes::new()),
             ClientProtocol::Foxglove { .. } => Outbox::saying(foxglove::gap),
         }
-        .telling(self.room_made.clone());
-        let channels = read(&self.channels);
+        .telling(self.clients.room_made.clone());
+        let channels = read(&self.channels.by_number);
         if let ClientProtocol::Foxglove { controls } = shape {
             outbox.reply(self.server_info(controls));
             outbox.reply(foxglove::channels(
@@ -344,21 +302,22 @@ impl Hub {
             }
         }
         let client = Arc::new(Client {
-            number: self.next_client.fetch_add(1, Ordering::Relaxed),
+            number: self.clients.last.fetch_add(1, Ordering::Relaxed) + 1,
             peer: peer.into(),
             outbox,
             shape,
             since: Instant::now(),
             sensors: AtomicUsize::new(0),
             is_broker: AtomicBool::new(false),
+            complaints: Complaints::default(),
         });
-        write(&self.clients).insert(client.number, client.clone());
+        write(&self.clients.by_number).insert(client.number, client.clone());
         client
     }
 
     /// Removes a client that has gone; its sensors may be sent by others.
     pub fn leave(&self, client: &Client, owned: &[Arc<Mutex<Sensor>>]) {
-        write(&self.clients).remove(&client.number);
+        write(&self.clients.by_number).remove(&client.number);
         if client.outbox.level().watching {
             self.watch_changed();
         }
@@ -376,7 +335,7 @@ impl Hub {
             }
         }
         // All at once, so that who looks for a place meanwhile sees all of them left, or none.
-        let _sensors = read(&self.sensors);
+        let _sensors = read(&self.sensors.by_id);
         for sensor in owned {
             let mut sensor = lock(sensor);
             if sensor.owner == Some(client.number) {
@@ -388,8 +347,8 @@ impl Hub {
     /// Somebody started or stopped watching.
     pub fn watch_changed(&self) {
         // The list is made under its own lock, so that the last one made is the newest.
-        let mut watchers = write(&self.watchers);
-        *watchers = read(&self.clients)
+        let mut watchers = write(&self.clients.watchers);
+        *watchers = read(&self.clients.by_number)
             .values()
             .filter(|c| c.outbox.level().watching)
             .cloned()
@@ -399,7 +358,7 @@ impl Hub {
     /// Number of connected clients.
     #[must_use]
     pub fn connected(&self) -> usize {
-        read(&self.clients).len()
+        read(&self.clients.by_number).len()
     }
 
     /// Takes samples of a sensor and gives its attitudes to whoever watches. What the sender should
@@ -415,22 +374,24 @@ impl Hub {
     ) -> std::result::Result<Feedback, Fault> {
         let mut sensor = lock(sensor);
         let id = sensor.stream.id().clone();
-        let refuse = |code, what: String| Fault {
+        let refuse = |code, kind, what: &str| Fault {
             id: Some(id.to_string()),
+            kind,
             ..Fault::new(code, what)
         };
         if sensor.gave_way {
             return Err(refuse(
-                GAVE_WAY,
-                "its place has just gone to another sensor; its next sample asks for one"
-                    .to_owned(),
+                "gave_way",
+                Kind::GaveWay,
+                "its place has just gone to another sensor; its next sample asks for one",
             ));
         }
         match sensor.owner {
             Some(owner) if owner != run.client && !self.is_left(&sensor) => {
                 return Err(refuse(
                     "id_in_use",
-                    "another connection sends the samples of this sensor; give this one an `id` of its own".to_owned(),
+                    Kind::InUse,
+                    "another connection sends the samples of this sensor; give this one an `id` of its own",
                 ));
             }
             Some(owner) if owner == run.client => {}
@@ -439,12 +400,13 @@ impl Hub {
                 sensor.stream.meet();
             }
         }
-        sensor.heard = self.heard.fetch_add(1, Ordering::Relaxed);
-        sensor.heard_at = self.tick.load(Ordering::Relaxed);
-        if !sensor.stream.agrees(self.plan_of(&id), run.head) {
+        sensor.heard = self.sensors.heard.fetch_add(1, Ordering::Relaxed);
+        sensor.heard_at = self.sensors.tick.load(Ordering::Relaxed);
+        if !sensor.stream.agrees(self.sensors.plan_of(&id), run.head) {
             return Err(refuse(
                 "meaning_changed",
-                "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`".to_owned(),
+                Kind::Loss,
+                "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`",
             ));
         }
         count(&self.counters.samples, rates_in(run.samples));
@@ -454,7 +416,7 @@ impl Hub {
             Some(taken) => (&*taken.lines, &*taken.samples),
         };
         if sensor.stream.is_waiting() {
-            self.stamps_wait.store(true, Ordering::Relaxed);
+            self.sensors.stamps_wait.store(true, Ordering::Relaxed);
         }
         self.integrate(&mut sensor, lines, samples, (run.placed, run.first), text)
     }
@@ -469,7 +431,7 @@ impl Hub {
         text: &mut Vec<u8>,
     ) -> std::result::Result<Feedback, Fault> {
         let id = &sensor.stream.id().clone();
-        let plan = self.plan_of(id);
+        let plan = self.sensors.plan_of(id);
         let window = self.limits.state_window;
         let note = sensor.stream.join(plan, samples, window, placed)?;
         let mut rest = samples;
@@ -531,7 +493,7 @@ impl Hub {
             Ok(feedback) => (feedback.note, feedback.faults),
             Err(fault) => (None, vec![fault]),
         };
-        let clients = read(&self.clients);
+        let clients = read(&self.clients.by_number);
         let owner = sensor.owner.and_then(|owner| clients.get(&owner));
         for fault in note.iter().chain(&faults) {
             log_throttle::info(&format!("run {id}"), &format!("{id}: {}", fault.message));
@@ -541,24 +503,24 @@ impl Hub {
             owner.outbox.reply(said);
         }
         for fault in &faults {
-            owner.outbox.reply(wire::error(fault, 0, &[], 0));
+            owner.complain(fault, (0, &[]), 0);
         }
     }
 
     /// Ends waits. To be called again and again: nobody waits for long for the unit of a stamp
     /// ([`stream::stamps::LONGEST_WAIT`](super::stream::stamps::LONGEST_WAIT)).
     pub fn end_waits(&self, now: Nanos) {
-        if !self.stamps_wait.swap(false, Ordering::Relaxed) {
+        if !self.sensors.stamps_wait.swap(false, Ordering::Relaxed) {
             return;
         }
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let sensors: Vec<_> = read(&self.sensors.by_id).values().cloned().collect();
         for sensor in sensors {
             let mut sensor = lock(&sensor);
             if sensor.stream.is_overdue(now) {
                 self.take_overdue(&mut sensor);
             }
             if sensor.stream.is_waiting() {
-                self.stamps_wait.store(true, Ordering::Relaxed);
+                self.sensors.stamps_wait.store(true, Ordering::Relaxed);
             }
         }
     }
@@ -567,7 +529,7 @@ impl Hub {
     #[cfg(feature = "nats")]
     #[must_use]
     pub fn is_anything_waiting(&self) -> bool {
-        self.stamps_wait.load(Ordering::Relaxed)
+        self.sensors.stamps_wait.load(Ordering::Relaxed)
     }
 
     /// A line that could not be read stood among the samples of this sensor.

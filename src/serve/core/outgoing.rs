@@ -36,7 +36,7 @@ struct State {
 /// Place up to which a stream of a broker has been read, and whether we may read it.
 #[cfg(feature = "nats")]
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct StreamPlace {
+pub(in crate::serve) struct StreamPlace {
     /// Number of the last message that was taken.
     pub(in crate::serve) sequence: Option<u64>,
     /// Number of messages behind that.
@@ -105,7 +105,7 @@ impl Outgoing {
         }
     }
 
-    /// The same, of a router of zenoh.
+    /// Makes it a router of zenoh.
     #[cfg(feature = "zenoh")]
     pub(in crate::serve) fn of_router(self) -> Outgoing {
         Outgoing {

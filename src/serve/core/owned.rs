@@ -2,9 +2,11 @@
 //!
 //! The hub alone keeps a sensor: one that was put away is gone, and whoever sends it asks for a place again.
 
-use super::hub::{Client, Feedback, GAVE_WAY, Hub, Sensor};
+use super::hub::{Client, Feedback, Hub, Sensor, count};
 use super::stream::run::SampleRun;
-use crate::serve::guard::fault::Fault;
+use crate::serve::guard::fault::{Fault, Kind};
+use crate::serve::guard::log_throttle;
+use crate::serve::guard::losses::Lost;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
 
@@ -19,10 +21,13 @@ pub struct Owned {
     looked: usize,
     /// The one that was sent last.
     last: Option<Weak<Mutex<Sensor>>>,
+    /// Some of its samples were taken.
+    has_sent: bool,
 }
 
 impl Owned {
-    /// Gives a run to its sensor, which is begun by its first sample and goes on when it was put away.
+    /// Gives a run to its sensor, which is begun by its first sample and goes on when it was put away. What became
+    /// of it is counted, and stands in the log.
     ///
     /// # Errors
     /// The fault to answer with; none of the samples was used.
@@ -33,15 +38,53 @@ impl Owned {
         run: &SampleRun<'_>,
         text: &mut Vec<u8>,
     ) -> Result<Feedback, Fault> {
+        let news = self.hand_over_again(hub, client, run, text);
+        match &news {
+            Ok(feedback) => {
+                self.has_sent = true;
+                hub.losses.over(&client.peer.name);
+                if let Some(note) = &feedback.note {
+                    let id = run.id();
+                    log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
+                }
+            }
+            Err(fault) => {
+                count(&hub.counters.refused_samples, run.samples.len());
+                hub.losses.add(&Lost {
+                    source: run.id(),
+                    fault,
+                    first: run.first,
+                    count: run.samples.len() as u64,
+                    // Another may send it as it should.
+                    is_whole: fault.kind != Kind::InUse,
+                });
+            }
+        }
+        news
+    }
+
+    /// Whether some of its samples were taken.
+    #[must_use]
+    pub fn has_sent(&self) -> bool {
+        self.has_sent
+    }
+
+    /// Hands a run over, and once more when its sensor was put away just then.
+    fn hand_over_again(
+        &mut self,
+        hub: &Hub,
+        client: &Client,
+        run: &SampleRun<'_>,
+        text: &mut Vec<u8>,
+    ) -> Result<Feedback, Fault> {
         let id = run.id();
         let news = self.hand_over(hub, client, run, text);
-        if !matches!(&news, Err(fault) if fault.code == GAVE_WAY) {
+        if !matches!(&news, Err(fault) if fault.kind == Kind::GaveWay) {
             return news;
         }
-        // It was put away just now.
         self.drop_one(id, client);
         let news = self.hand_over(hub, client, run, text);
-        if matches!(&news, Err(fault) if fault.code == GAVE_WAY) {
+        if matches!(&news, Err(fault) if fault.kind == Kind::GaveWay) {
             self.drop_one(id, client);
         }
         news

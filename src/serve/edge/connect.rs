@@ -16,9 +16,7 @@ use crate::serve::guard::log_throttle;
 use crate::serve::guard::redial::Redial;
 use crate::serve::guard::shutdown::Running;
 use crate::serve::protocol::upstream::Event;
-use bytes::Bytes;
 use futures_util::FutureExt;
-use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -91,7 +89,6 @@ async fn converse(
     let side = Side::source(source.id.clone(), source.decoder(hub.decode_options()));
     let mut session = Session::with(hub, source.name.clone(), side);
     let mut bytes = Vec::new();
-    let mut said = VecDeque::new();
     let mut asked = source.protocol == Protocol::Strapd;
     let mut asked_again = false;
     let is_web = matches!(source.remote, Remote::WebSocket { .. });
@@ -125,7 +122,7 @@ async fn converse(
                     while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
                         link.read(&mut bytes).now_or_never()
                     {
-                        take(&mut session, &heard, &bytes, &mut said).await;
+                        take(&mut session, &heard, &bytes, outgoing).await;
                     }
                 };
                 let _ = timeout(hub.limits().drain / 2, rest).await;
@@ -134,7 +131,7 @@ async fn converse(
         };
         let ended = match heard {
             Ok(heard) => {
-                take(&mut session, &heard, &bytes, &mut said).await;
+                take(&mut session, &heard, &bytes, outgoing).await;
                 match heard {
                     Heard::Bytes | Heard::Message => None,
                     Heard::Closed(None) => Some("the peer has closed the connection".to_owned()),
@@ -144,12 +141,6 @@ async fn converse(
             Err(why) if why.kind() == io::ErrorKind::Interrupted => None,
             Err(why) => Some(why.to_string()),
         };
-        // What a client would be told is for our own log.
-        for line in said.drain(..) {
-            if let Some(Event::Complained(what)) = crate::serve::protocol::upstream::read(&line) {
-                outgoing.complain(&what);
-            }
-        }
         for event in session.events() {
             match event {
                 Event::Greeted(run) if run == hub.session() => {
@@ -190,15 +181,17 @@ async fn converse(
     }
 }
 
-/// Takes what was heard, step by step; `said`: what a client would be told of it.
-async fn take(session: &mut Session, heard: &Heard, bytes: &[u8], said: &mut VecDeque<Bytes>) {
+/// Takes what was heard, step by step; what a client would be told of it is for our own log.
+async fn take(session: &mut Session, heard: &Heard, bytes: &[u8], outgoing: &Outgoing) {
     with_read_buffer(|_, scratch| match heard {
         Heard::Bytes => session.bytes(bytes, now(), scratch),
         Heard::Message => session.message(bytes, now(), scratch),
         Heard::Closed(_) => session.finish(now(), scratch),
     });
     loop {
-        session.client().outbox.discard(said);
+        for complaint in session.complaints() {
+            outgoing.complain(&complaint.fault.in_words());
+        }
         if !session.is_held() {
             return;
         }

@@ -15,7 +15,7 @@ pub use resetting::{Reset, reset_answer};
 use super::chunk::{Dropped, MAX_QUEUED};
 use super::filter::{Class as Stream, Filter};
 use super::position::{Action, Position};
-use crate::serve::guard::fault::Fault;
+use crate::serve::guard::fault::{Fault, Kind};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -165,29 +165,35 @@ pub fn read_from(
         return Err(Fault::new(
             "other_sensor",
             format!("`{sensor}` brings no body rate; it is passed over"),
-        ));
+        )
+        .of(Kind::OtherSensor));
     }
+    let request = |fault: Fault| fault.of(Kind::Request);
     match class.as_deref() {
         Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
         // What a source says of itself is no request.
-        Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
-        Some("WATCH") => watch(line).map(Message::Watch),
+        Some(other) if is_source => {
+            Err(Fault::new("unknown_class", other.to_owned()).of(Kind::UnknownClass))
+        }
+        Some("WATCH") => watch(line).map(Message::Watch).map_err(request),
         Some("POLL") => Ok(Message::Poll),
         Some("RESET") => Ok(Message::Reset(resetting::read(line))),
-        Some("PLAYBACK") => playback_action(line).map(Message::Playback),
+        Some("PLAYBACK") => playback_action(line).map(Message::Playback).map_err(request),
         Some("ATT") if head.id.as_deref() == Some(TRUTH) => {
             reference::read(line).map(|found| Message::Reference(Box::new(found)))
         }
         Some("AUTH") => {
             object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")
                 .map(|auth| Message::Auth(auth.token))
+                .map_err(request)
         }
         Some(other) => Err(Fault::new(
             "unknown_class",
             format!(
                 "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, RESET, PLAYBACK, AUTH"
             ),
-        )),
+        )
+        .of(Kind::UnknownClass)),
         None => Err(Fault::new(
             "no_rate",
             "the line holds no body rate and no class; expected like {\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}",
@@ -298,6 +304,7 @@ pub fn undecodable(why: &Undecodable) -> Fault {
     match why {
         Undecodable::Json { offset, what } => Fault {
             column: Some(offset + 1),
+            kind: Kind::NoObject,
             ..Fault::new("bad_json", format!("{what}, at column {}", offset + 1))
         },
         Undecodable::LongLine { .. } => too_long(),

@@ -7,8 +7,8 @@ use super::address::{From, LeaseKey, NatsAddress};
 use super::connection::{in_words, keep_connecting};
 use super::lease::{Document, Lease, worker_name};
 use super::tenure::{Tenancy, Tenure};
-use crate::serve::brokers::{MAX_PAYLOAD, complaint, lost};
-use crate::serve::core::hub::Hub;
+use crate::serve::brokers::{MAX_PAYLOAD, lost};
+use crate::serve::core::hub::{Complaint, Hub};
 use crate::serve::core::outgoing::Outgoing;
 use crate::serve::core::read_buffer::{now, with_read_buffer};
 use crate::serve::core::session::{Session, Side};
@@ -21,7 +21,7 @@ use async_nats::jetstream::{self, kv};
 use async_nats::{Client, Event, Subscriber};
 use bytes::Bytes;
 use futures_util::StreamExt;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use strapd_recording::decode::exact_name;
@@ -346,7 +346,6 @@ impl Reader {
         if message.subject.ends_with(ERRORS) {
             return;
         }
-        let mut said = VecDeque::new();
         if message.payload.len() > MAX_PAYLOAD {
             let what = format!(
                 "a payload of {} bytes, at most {MAX_PAYLOAD} are read",
@@ -368,8 +367,10 @@ impl Reader {
             }
         }
         with_read_buffer(|_, scratch| session.message(&message.payload, now(), scratch));
+        let mut complaint = None;
         loop {
-            session.client().outbox.discard(&mut said);
+            let first = session.complaints().into_iter().next();
+            complaint = complaint.or(first);
             if !session.is_held() {
                 break;
             }
@@ -379,13 +380,14 @@ impl Reader {
             }
             with_read_buffer(|_, scratch| session.go_on(scratch));
         }
-        if let Some((error, what)) = complaint(&said) {
-            self.answer(message, error, &what).await;
+        if let Some(complaint) = complaint {
+            self.answer(message, complaint).await;
         }
     }
 
     /// Says to who listens what is wrong with the messages of a subject.
-    async fn answer(&mut self, message: &Message, error: &Bytes, what: &str) {
+    async fn answer(&mut self, message: &Message, complaint: Complaint) {
+        let what = complaint.fault.in_words();
         self.outgoing
             .complain(&format!("{}: {what}", printable(&message.subject)));
         if self
@@ -397,7 +399,7 @@ impl Reader {
         self.complained = Some(Instant::now());
         let subject = format!("{}{ERRORS}", message.subject);
         // Nobody waits for it.
-        let _ = timeout(PATIENCE, self.client.publish(subject, error.clone())).await;
+        let _ = timeout(PATIENCE, self.client.publish(subject, complaint.answer)).await;
     }
 
     /// Hands the state to the lease, once every attitude made of it is stored.

@@ -8,7 +8,7 @@ use super::connection::{connect, end, lost};
 use super::rings::{Message, Rings, Turn};
 use super::robot::{Read, Robots};
 use super::ros::{self, Key, Token};
-use crate::serve::brokers::{self, MAX_PAYLOAD, complaint};
+use crate::serve::brokers::{self, MAX_PAYLOAD};
 use crate::serve::core::hub::{Flood, Hub, count};
 use crate::serve::core::outgoing::{Outgoing, TopicSeen};
 use crate::serve::core::read_buffer::{now, with_read_buffer};
@@ -18,7 +18,6 @@ use crate::serve::guard::redial::Redial;
 use crate::serve::guard::shutdown::Running;
 use ::zenoh::key_expr::KeyExpr;
 use ::zenoh::sample::{Sample, SampleKind};
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use strapd_recording::decode::exact_name;
@@ -171,9 +170,8 @@ impl Reader {
 
     /// Says in the log what was wrong with what a key brought.
     fn say(&mut self, key: &str) {
-        let mut said = VecDeque::new();
-        self.session.client().outbox.discard(&mut said);
-        if let Some((_, what)) = complaint(&said) {
+        if let Some(complaint) = self.session.complaints().first() {
+            let what = complaint.fault.in_words();
             self.outgoing
                 .complain(&format!("{}: {what}", printable(key)));
         }

@@ -17,15 +17,18 @@ impl Hub {
     /// Whether clients may send samples: a replay has its own.
     #[must_use]
     pub fn takes_samples(&self) -> bool {
-        self.timeline.is_none()
+        self.simulation.timeline.is_none()
     }
 
     /// Classes that can be watched.
     #[must_use]
     pub fn classes(&self) -> Vec<Class> {
-        let mut classes: Vec<Class> = read(&self.channels).values().map(|c| c.class()).collect();
+        let mut classes: Vec<Class> = read(&self.channels.by_number)
+            .values()
+            .map(|c| c.class())
+            .collect();
         classes.push(Class::Att);
-        classes.extend(self.brings_samples.then_some(Class::Rate));
+        classes.extend(self.simulation.brings_samples.then_some(Class::Rate));
         classes.sort_unstable();
         classes.dedup();
         classes
@@ -33,13 +36,13 @@ impl Hub {
 
     /// A further stream; viewers are told.
     pub fn declare(&self, stream: &Stream) -> Arc<Channel> {
-        let mut channels = write(&self.channels);
-        let child = lock(&self.child_frames).take(stream);
-        let number = self.next_channel.fetch_add(1, Ordering::Relaxed);
+        let mut channels = write(&self.channels.by_number);
+        let child = lock(&self.channels.child_frames).take(stream);
+        let number = self.channels.last.fetch_add(1, Ordering::Relaxed) + 1;
         let channel = Arc::new(Channel::new(number, stream, child));
         channels.insert(number, channel.clone());
         // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
-        let clients = read(&self.clients);
+        let clients = read(&self.clients.by_number);
         let mut viewers = clients.values().filter(|c| c.is_viewer()).peekable();
         if viewers.peek().is_some() {
             let said = foxglove::channels(channel.topics(), false);
@@ -53,7 +56,7 @@ impl Hub {
     #[must_use]
     pub fn has_channel(&self, number: u32) -> bool {
         number == TRANSFORMS
-            || read(&self.channels)
+            || read(&self.channels.by_number)
                 .get(&stream_of(number))
                 .is_some_and(|c| c.has(number))
     }
@@ -61,7 +64,7 @@ impl Hub {
     /// Position of the replay; `None` where there is none to be controlled.
     #[must_use]
     pub fn where_it_is(&self) -> Option<Position> {
-        self.timeline.as_ref()?.position()
+        self.simulation.timeline.as_ref()?.position()
     }
 
     /// The same as a line.
@@ -74,7 +77,7 @@ impl Hub {
     pub fn began_anew(&self) {
         // Before the clients are locked: `control` locks the playback first, then them.
         let (plain, controlling) = (self.server_info(false), self.server_info(true));
-        for client in read(&self.clients).values() {
+        for client in read(&self.clients.by_number).values() {
             if let ClientProtocol::Foxglove { controls } = client.shape {
                 let info = if controls { &controlling } else { &plain };
                 client.outbox.reply(info.clone());
@@ -91,14 +94,14 @@ impl Hub {
     /// # Errors
     /// The fault to answer with.
     pub fn control(&self, client: u64, action: Action) -> std::result::Result<(), Fault> {
-        let timeline = self.timeline.as_ref().ok_or_else(|| {
+        let timeline = self.simulation.timeline.as_ref().ok_or_else(|| {
             Fault::new(
                 "nothing_to_play",
                 "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
             )
         })?;
         timeline.ask(action, &mut || {
-            for client in read(&self.clients).values() {
+            for client in read(&self.clients.by_number).values() {
                 client.outbox.forget();
             }
         })?;
@@ -112,7 +115,7 @@ impl Hub {
             return;
         };
         let line = wire::playback(&place, &self.session());
-        let clients = read(&self.clients);
+        let clients = read(&self.clients.by_number);
         for client in clients.values().filter(|c| Some(c.number) != but) {
             match client.shape {
                 ClientProtocol::Lines(Profile::Lines) if client.outbox.level().watching => {
@@ -129,9 +132,12 @@ impl Hub {
 
     /// The streams of a replay, for `STATUS`; those of sensors say more themselves.
     pub(super) fn own_streams(&self) -> Vec<serde_json::Value> {
-        match &self.timeline {
+        match &self.simulation.timeline {
             None => Vec::new(),
-            Some(_) => read(&self.channels).values().map(|c| c.status()).collect(),
+            Some(_) => read(&self.channels.by_number)
+                .values()
+                .map(|c| c.status())
+                .collect(),
         }
     }
 }

@@ -141,7 +141,7 @@ fn lose_patience(watchers: &[Arc<Client>]) {
 
 impl Hub {
     pub(super) fn watchers(&self) -> Arc<[Arc<Client>]> {
-        read(&self.watchers).clone()
+        read(&self.clients.watchers).clone()
     }
 
     fn room_in_thread(&self, until: Instant) -> Waited {
@@ -169,7 +169,7 @@ impl Hub {
         tokio::task::yield_now().await;
         loop {
             // Made before it is looked: no room made meanwhile goes unnoticed.
-            let made = self.room_made.notified();
+            let made = self.clients.room_made.notified();
             if !is_crowded(&watchers) {
                 return Waited::Room;
             }

@@ -23,7 +23,7 @@ impl Hub {
         };
         let takes =
             |filter: &Filter, channel: &Channel| filter.takes(channel.id(), channel.class());
-        for channel in read(&self.channels).values() {
+        for channel in read(&self.channels.by_number).values() {
             if takes(&filter, channel) && !before.as_ref().is_some_and(|b| takes(b, channel)) {
                 bring(client, channel, since, Wanted::Object(filter.form));
             }
@@ -34,7 +34,7 @@ impl Hub {
     /// chunks were queued for it.
     pub fn subscribed(&self, client: &Client, made: BTreeMap<u32, u32>, since: u64) {
         let clock = self.clock();
-        let channels = read(&self.channels);
+        let channels = read(&self.channels.by_number);
         for (channel, subscription) in made {
             let wanted = Wanted::Message {
                 channel,
@@ -53,7 +53,7 @@ impl Hub {
 
     /// Clock of the messages for viewers.
     pub(super) fn clock(&self) -> Clock {
-        match &self.timeline {
+        match &self.simulation.timeline {
             None => Clock::Log,
             Some(_) => Clock::Stamp,
         }

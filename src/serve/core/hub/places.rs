@@ -5,7 +5,7 @@ use crate::serve::core::channel::Channel;
 use crate::serve::core::state::{Saved, Sensors};
 use crate::serve::core::stream::SensorStream;
 use crate::serve::core::stream::run::SampleRun;
-use crate::serve::guard::fault::Fault;
+use crate::serve::guard::fault::{Fault, Kind};
 use crate::serve::guard::peer::Origin;
 use crate::serve::protocol::foxglove;
 use crate::serve::protocol::wire::TRUTH;
@@ -77,17 +77,18 @@ impl Hub {
         run: &SampleRun<'_>,
     ) -> Result<Arc<Mutex<Sensor>>, Fault> {
         self.check_share(client)?;
-        if let Some(sensor) = read(&self.sensors).get(id) {
+        if let Some(sensor) = read(&self.sensors.by_id).get(id) {
             client.sensors.fetch_add(1, Ordering::Relaxed);
             return Ok(sensor.clone());
         }
-        if id == TRUTH && lock(&self.truth).is_some() {
+        if id == TRUTH && lock(&self.simulation.truth).is_some() {
             return Err(Fault::new(
                 "id_in_use",
                 "`truth` is what a simulation sends here: a sensor needs another name",
-            ));
+            )
+            .of(Kind::InUse));
         }
-        let mut sensors = write(&self.sensors);
+        let mut sensors = write(&self.sensors.by_id);
         if let Some(sensor) = sensors.get(id) {
             client.sensors.fetch_add(1, Ordering::Relaxed);
             return Ok(sensor.clone());
@@ -96,24 +97,24 @@ impl Hub {
             self.make_room(&mut sensors)?;
         }
         let id: Arc<str> = id.into();
-        let last = lock(&self.saved).get(&id).cloned();
+        let last = lock(&self.sensors.absent).get(&id).cloned();
         let stream = SensorStream::new(
-            self.plan_of(&id),
+            self.sensors.plan_of(&id),
             id.clone(),
             run.head,
             run.samples,
             last,
             |labels| self.declare(labels),
         )?;
-        lock(&self.saved).remove(&id);
+        lock(&self.sensors.absent).remove(&id);
         if let Some(recorder) = &self.recorder {
             recorder.declare(stream.recorded());
         }
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
-            heard: self.heard.fetch_add(1, Ordering::Relaxed),
-            heard_at: self.tick.load(Ordering::Relaxed),
+            heard: self.sensors.heard.fetch_add(1, Ordering::Relaxed),
+            heard_at: self.sensors.tick.load(Ordering::Relaxed),
             gave_way: false,
         }));
         sensors.insert(id, sensor.clone());
@@ -134,7 +135,7 @@ impl Hub {
         let Some(who) = client.peer.origin.named() else {
             return Ok(());
         };
-        let all: usize = read(&self.clients)
+        let all: usize = read(&self.clients.by_number)
             .values()
             .filter(|c| c.peer.origin == client.peer.origin)
             .map(|c| c.sensors.load(Ordering::Relaxed))
@@ -168,7 +169,7 @@ impl Hub {
         };
         self.put_away(sensors, &id);
         count(&self.counters.gave_way, 1);
-        let mut told = lock(&self.gave_way);
+        let mut told = lock(&self.sensors.gave_way);
         told.retain(|known| *known != id);
         if told.len() == TOLD {
             told.pop_front();
@@ -183,9 +184,9 @@ impl Hub {
         let Some(owner) = sensor.owner else {
             return true;
         };
-        let now = self.tick.load(Ordering::Relaxed);
+        let now = self.sensors.tick.load(Ordering::Relaxed);
         now - sensor.heard_at.min(now) > ticks(self.limits.sender_silence)
-            && read(&self.clients)
+            && read(&self.clients.by_number)
                 .get(&owner)
                 .is_some_and(|owner| owner.is_broker.load(Ordering::Relaxed))
     }
@@ -193,7 +194,7 @@ impl Hub {
     /// Gives up places of sensors that were silent for longer than they may be; to be called every [`TICK`].
     /// Their attitudes are kept, and go on when they come back.
     pub fn forget_silent(&self) {
-        let now = self.tick.fetch_add(1, Ordering::Relaxed) + 1;
+        let now = self.sensors.tick.fetch_add(1, Ordering::Relaxed) + 1;
         let Some(after) = self.limits.forget_after else {
             return;
         };
@@ -203,7 +204,7 @@ impl Hub {
             return;
         }
         let all: Vec<_> = {
-            let sensors = read(&self.sensors);
+            let sensors = read(&self.sensors.by_id);
             let all = sensors.iter().map(|(id, s)| (id.clone(), s.clone()));
             all.collect()
         };
@@ -214,7 +215,7 @@ impl Hub {
         };
         let silent = all.into_iter().filter(|(_, sensor)| is_silent(sensor));
         for (id, sensor) in silent {
-            let mut sensors = write(&self.sensors);
+            let mut sensors = write(&self.sensors.by_id);
             // It may have spoken meanwhile.
             if is_silent(&sensor) {
                 self.put_away(&mut sensors, &id);
@@ -230,7 +231,7 @@ impl Hub {
             // Somebody may be about to send it.
             sensor.gave_way = true;
             if let Some(saved) = sensor.stream.saved().filter(|last| last.check().is_ok()) {
-                lock(&self.saved).insert(id, saved, self.limits.sensors);
+                lock(&self.sensors.absent).insert(id, saved, self.limits.sensors);
             }
             self.withdraw(sensor.stream.channel());
         }
@@ -239,7 +240,7 @@ impl Hub {
     /// Sensors that another worker has had go on from where they were.
     #[cfg(feature = "nats")]
     pub fn restore(&self, sensors: Sensors) {
-        let mut saved = lock(&self.saved);
+        let mut saved = lock(&self.sensors.absent);
         for (id, one) in sensors {
             saved.insert(&id, one, self.limits.sensors);
         }
@@ -248,26 +249,26 @@ impl Hub {
     /// Forgets these sensors, which are another worker's.
     #[cfg(feature = "nats")]
     pub fn forget(&self, ids: &std::collections::BTreeSet<String>) {
-        let mut sensors = write(&self.sensors);
+        let mut sensors = write(&self.sensors.by_id);
         for id in ids {
             if let Some(sensor) = sensors.remove(id.as_str()) {
                 let mut sensor = lock(&sensor);
                 sensor.gave_way = true;
                 self.withdraw(sensor.stream.channel());
             }
-            lock(&self.saved).remove(id);
+            lock(&self.sensors.absent).remove(id);
         }
     }
 
     /// A stream is no more; viewers are told.
     fn withdraw(&self, channel: &Channel) {
-        let mut channels = write(&self.channels);
+        let mut channels = write(&self.channels.by_number);
         if channels.remove(&channel.number()).is_some() {
-            lock(&self.child_frames).give_back(channel.stream(), channel.child());
+            lock(&self.channels.child_frames).give_back(channel.stream(), channel.child());
         }
         let numbers: Vec<u32> = channel.topics().map(|(number, _)| number).collect();
         let said = foxglove::withdrawn(&numbers);
-        for client in read(&self.clients).values() {
+        for client in read(&self.clients.by_number).values() {
             client
                 .outbox
                 .forget_stream(channel.id(), channel.number(), &numbers);
@@ -281,10 +282,10 @@ impl Hub {
     pub(super) fn places(&self) -> serde_json::Value {
         serde_json::json!({
             "sensors": self.limits.sensors,
-            "taken": read(&self.sensors).len(),
-            "saved": lock(&self.saved).iter().count(),
+            "taken": read(&self.sensors.by_id).len(),
+            "saved": lock(&self.sensors.absent).iter().count(),
             "gave_way": self.counters.gave_way.load(Ordering::Relaxed),
-            "gave_way_last": lock(&self.gave_way).iter().map(|id| &**id).collect::<Vec<_>>(),
+            "gave_way_last": lock(&self.sensors.gave_way).iter().map(|id| &**id).collect::<Vec<_>>(),
         })
     }
 }
@@ -337,7 +338,7 @@ mod tests {
         };
         send("silent longest");
         send("newer");
-        let looked_at = read(&hub.sensors)["silent longest"].clone();
+        let looked_at = read(&hub.sensors.by_id)["silent longest"].clone();
         let held = lock(&looked_at);
         std::thread::scope(|scope| {
             let sent = scope.spawn(|| send("newest"));
@@ -385,15 +386,19 @@ mod tests {
                 .subscribe(foxglove::frames::channel_of(n as u32 + 1), n as u32, 4096);
             viewer.outbox.discard(&mut said);
         }
-        assert_eq!(read(&hub.sensors).len(), places);
-        assert_eq!(read(&hub.channels).len(), places);
-        assert_eq!(lock(&hub.saved).order.len(), places);
-        assert_eq!(lock(&hub.saved).sensors.len(), places);
+        assert_eq!(read(&hub.sensors.by_id).len(), places);
+        assert_eq!(read(&hub.channels.by_number).len(), places);
+        assert_eq!(lock(&hub.sensors.absent).order.len(), places);
+        assert_eq!(lock(&hub.sensors.absent).sensors.len(), places);
         // The newest are there, those before them are saved, and the viewer was told of each.
         assert!(
-            read(&hub.sensors).contains_key("s159") && !read(&hub.sensors).contains_key("s151")
+            read(&hub.sensors.by_id).contains_key("s159")
+                && !read(&hub.sensors.by_id).contains_key("s151")
         );
-        assert!(lock(&hub.saved).get("s151").is_some() && lock(&hub.saved).get("s143").is_none());
+        assert!(
+            lock(&hub.sensors.absent).get("s151").is_some()
+                && lock(&hub.sensors.absent).get("s143").is_none()
+        );
         let count = |what: &[u8]| {
             let has = |line: &&bytes::Bytes| line.windows(what.len()).any(|w| w == what);
             said.iter().filter(has).count()

@@ -24,13 +24,13 @@ impl Hub {
     /// # Errors
     /// `id_in_use`: another client sends it, or a sensor is called so; `bad_reference`: of other axes than before.
     pub fn refer(&self, client: u64, found: &Reference, text: &mut Vec<u8>) -> Result<(), Fault> {
-        if read(&self.sensors).contains_key(TRUTH) {
+        if read(&self.sensors.by_id).contains_key(TRUTH) {
             return Err(Fault::new(
                 "id_in_use",
                 "a sensor is called `truth`: its attitude is estimated, and no reference",
             ));
         }
-        let mut truth = lock(&self.truth);
+        let mut truth = lock(&self.simulation.truth);
         let truth = truth.get_or_insert_with(|| Truth {
             channel: self.declare(&wire::reference_stream(found.world, found.body)),
             next: 0,
@@ -63,7 +63,7 @@ impl Hub {
 
     /// Lets others send the truth that this client has sent.
     pub(super) fn give_truth_back(&self, client: &Client) {
-        if let Some(truth) = &mut *lock(&self.truth)
+        if let Some(truth) = &mut *lock(&self.simulation.truth)
             && truth.owner == Some(client.number)
         {
             truth.owner = None;

@@ -20,7 +20,7 @@ impl Hub {
     /// The state of everything, for `STATUS`.
     #[must_use]
     pub fn status(&self) -> Bytes {
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let sensors: Vec<_> = read(&self.sensors.by_id).values().cloned().collect();
         let sources: Vec<_> = sensors
             .iter()
             .map(|s| lock(s).stream.status())
@@ -28,7 +28,7 @@ impl Hub {
             .collect();
         // Who is handed attitudes, not who is about to be.
         let watchers: BTreeSet<u64> = self.watchers().iter().map(|c| c.number).collect();
-        let clients: Vec<_> = read(&self.clients)
+        let clients: Vec<_> = read(&self.clients.by_number)
             .values()
             .map(|client| {
                 let level = client.outbox.level();
@@ -67,7 +67,7 @@ impl Hub {
     /// may be sensors.
     #[must_use]
     pub fn saved(&self) -> Sensors {
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let sensors: Vec<_> = read(&self.sensors.by_id).values().cloned().collect();
         let mut all: Sensors = sensors
             .iter()
             .filter_map(|sensor| {
@@ -77,7 +77,7 @@ impl Hub {
             })
             .collect();
         // One that has come back meanwhile is in both, and the newer counts.
-        for (id, saved) in lock(&self.saved).iter() {
+        for (id, saved) in lock(&self.sensors.absent).iter() {
             all.entry(id.clone()).or_insert_with(|| saved.clone());
         }
         all
@@ -88,7 +88,7 @@ impl Hub {
     pub fn calibrations(&self) -> Vec<(String, SensorCalibration)> {
         let mut all = Vec::new();
         self.each_sensor(|stream| {
-            let known = stream.calibration(self.plan_of(stream.id()));
+            let known = stream.calibration(self.sensors.plan_of(stream.id()));
             all.push((stream.id().to_string(), known));
         });
         all
@@ -113,7 +113,7 @@ impl Hub {
 
     /// Every sensor's report, by name, for the metrics.
     pub fn each_sensor(&self, mut tell: impl FnMut(&SensorStream)) {
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let sensors: Vec<_> = read(&self.sensors.by_id).values().cloned().collect();
         for sensor in sensors {
             tell(&lock(&sensor).stream);
         }
@@ -121,7 +121,7 @@ impl Hub {
 
     /// Every client's outbox, for the metrics.
     pub fn each_client(&self, mut tell: impl FnMut(&Client)) {
-        for client in read(&self.clients).values() {
+        for client in read(&self.clients.by_number).values() {
             tell(client);
         }
     }

@@ -59,7 +59,7 @@ impl Hub {
                 "no samples have come of a sensor of this name, so that there is nothing to begin anew; POLL says which there are",
             )
         };
-        let sensor = read(&self.sensors).get(asked.sensor()).cloned();
+        let sensor = read(&self.sensors.by_id).get(asked.sensor()).cloned();
         let sensor = sensor.ok_or_else(unknown)?;
         let mut sensor = lock(&sensor);
         if sensor.gave_way {
@@ -74,7 +74,7 @@ impl Hub {
                 "another connection sends the samples of this sensor, and only that (or the daemon's own page) may begin its attitude anew",
             ));
         }
-        let plan = self.plan_of(asked.sensor());
+        let plan = self.sensors.plan_of(asked.sensor());
         sensor
             .stream
             .reset(plan, asked.initial)

@@ -1,4 +1,4 @@
-//! What a hub is to do. Data.
+//! Settings of a hub. Data.
 
 use crate::serve::core::{recorder, state};
 use crate::serve::guard::admission::Token;

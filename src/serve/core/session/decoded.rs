@@ -27,9 +27,7 @@ impl Session {
             id: Some(id.to_owned()),
             ..Line::default()
         };
-        scratch.begin(head, 0, &[]);
-        scratch.samples.extend_from_slice(samples);
-        scratch.lines.extend_from_slice(messages);
+        scratch.run.fill(head, messages, samples);
         self.flush(received, scratch, usize::MAX);
     }
 
@@ -42,7 +40,7 @@ impl Session {
             fault: &Fault::new("undecodable", what),
             first: (0, &[]),
             count: 1,
-            is_whole: !self.has_sent,
+            is_whole: !self.has_sent(),
         });
     }
 

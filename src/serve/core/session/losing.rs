@@ -16,7 +16,7 @@ impl Session {
     /// A line brought no sample, though it should have.
     pub(super) fn lose(&self, fault: &Fault, number: u64, line: &[u8]) {
         // Requests bring none.
-        if matches!(fault.code, "bad_watch" | "bad_playback" | "bad_auth") {
+        if !fault.is_loss() {
             return;
         }
         let named = || {
@@ -29,7 +29,7 @@ impl Session {
             fault,
             first: (number, line),
             count: 1,
-            is_whole: !self.has_sent,
+            is_whole: !self.has_sent(),
         });
     }
 

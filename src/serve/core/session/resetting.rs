@@ -1,8 +1,8 @@
 //! `RESET` of a client -> the sensor, or why not. Pure but for locks.
 
-use super::{Session, Side};
+use super::Session;
 use crate::serve::core::hub::Asker;
-use crate::serve::guard::fault::Fault;
+use crate::serve::guard::fault::{Fault, Kind};
 use crate::serve::protocol::wire::{self, Reset};
 
 impl Session {
@@ -24,12 +24,12 @@ impl Session {
             Ok((asked, from)) => {
                 self.errors_in_a_row = 0;
                 // Who is told nothing is not told this.
-                if !matches!(self.side, Side::Deaf { .. }) {
+                if !self.side.is_deaf() {
                     self.client.outbox.reply(wire::reset_answer(&asked, from));
                 }
             }
             // Well said, if in vain: not held against it.
-            Err(fault) => self.say(&fault, number, line),
+            Err(fault) => self.say(&fault.of(Kind::Request), number, line),
         }
     }
 }

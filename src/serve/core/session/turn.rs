@@ -131,7 +131,7 @@ impl Session {
         let before = framer.ended();
         let mut take = |framed: Framed<'_>| {
             match framed {
-                Framed::Line(number, line) => self.line(number, line, received, scratch),
+                Framed::Line(number, line) => self.line((number, line), received, scratch),
                 Framed::Packed(number, object) => {
                     self.opening = Opening::Over;
                     self.packed(number, object, received, scratch);
@@ -145,7 +145,7 @@ impl Session {
                 Framed::TooLong(number, head) => self.refuse_opening(number, head),
                 Framed::Broken(number) => self.refuse_opening(number, &[]),
             }
-            if scratch.lines.len() >= LONGEST_RUN {
+            if scratch.run.lines() >= LONGEST_RUN {
                 self.flush(received, scratch, usize::MAX);
             }
             let is_long = std::mem::take(&mut self.step.worked) && began.elapsed() >= SLICE;

@@ -1,6 +1,6 @@
 //! Packed objects of a client -> samples, as its lines. Pure.
 
-use super::{Scratch, Session, Side, first_line_must_be_auth, goes_on};
+use super::{Scratch, Session, Side, first_line_must_be_auth};
 use crate::serve::core::hub::count;
 use crate::serve::guard::fault::Fault;
 use crate::serve::protocol::wire;
@@ -89,19 +89,19 @@ impl Session {
         let fault = match read {
             Ok((stream, seq, sample)) => match self.bound_or_of_subject(stream) {
                 Some(Ok(head)) => {
-                    let before = scratch.samples.len();
+                    let before = scratch.run.samples.len();
                     // Most are of the run before them: nothing is cloned for those.
-                    let begins = (!goes_on(scratch, head)).then(|| head.clone());
-                    scratch.samples.push(sample);
+                    let begins = (!scratch.run.goes_on_in(head)).then(|| head.clone());
+                    scratch.run.samples.push(sample);
                     if !self.hub.takes_samples() {
-                        return self.not_taken(number, &[], before, received, scratch);
+                        return self.not_taken((number, &[]), before, received, scratch);
                     }
                     self.errors_in_a_row = 0;
                     if let Some(head) = begins {
                         self.flush(received, scratch, before);
-                        scratch.begin(head, number, &[]);
+                        scratch.run.begin(head, (number, &[]));
                     }
-                    return scratch.lines.push((seq, scratch.samples.len()));
+                    return scratch.run.extend(seq);
                 }
                 Some(Err(fault)) => {
                     let fault = fault.clone();

@@ -21,7 +21,7 @@ pub enum Placed {
 }
 
 /// Samples of one sensor from one client that came together.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct SampleRun<'a> {
     /// Number of the client they come from.
     pub client: u64,

@@ -3,26 +3,25 @@
 //! One task per client reads, works and writes: no hop between tasks, no buffer while it idles, and
 //! a client that is worked for is not read from, which is how TCP slows a sender down.
 
-use crate::client::link;
+mod talk;
+
 use crate::serve::core::context::Context;
-use crate::serve::core::hub::{Flood, count};
+use crate::serve::core::hub::count;
 use crate::serve::core::outbox::Outbox;
-use crate::serve::core::read_buffer::{now, with_read_buffer};
+use crate::serve::core::read_buffer::with_read_buffer;
 use crate::serve::core::session::Session;
-use crate::serve::guard::fault::Fault;
 use crate::serve::guard::peer::Peer;
-use crate::serve::guard::places::{Kind, Place};
-use crate::serve::guard::shutdown::Running;
-use crate::serve::protocol::wire;
+use crate::serve::guard::places::Place;
 use bytes::{Buf, Bytes};
 use futures_util::FutureExt;
 use std::collections::VecDeque;
-use std::future::{Future, ready};
+use std::future::Future;
 use std::io::{self, IoSlice};
+use std::ops::ControlFlow;
 use std::time::Duration;
+use talk::Talk;
 use tokio::io::Ready;
-use tokio::task::yield_now;
-use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
+use tokio::time::timeout;
 
 /// A stream socket of tokio.
 pub(super) trait Duplex: Send + Sync + 'static {
@@ -123,207 +122,19 @@ pub(super) async fn converse(io: impl Duplex, peer: Peer, context: Context, plac
     let mut session = Session::new(&hub, peer, false);
     let client = session.client().clone();
     place.serves(client.clone());
-    let reason = talk(&io, &mut session, &mut running, &place).await;
+    let reason = {
+        let mut talk = Talk::new(&io, &mut session, &mut running, &place);
+        loop {
+            if let ControlFlow::Break(reason) = talk.round().await {
+                break reason;
+            }
+        }
+    };
     // What it sent is no longer its own; only its last words are still to be said.
     drop(session);
     if let Some(reason) = reason {
         count(&hub.counters.closed, 1);
         tracing::debug!("{}: closed: {reason}", client.peer);
-    }
-}
-
-/// The conversation. Returns why we ended it, if we did.
-async fn talk<D: Duplex>(
-    io: &D,
-    session: &mut Session,
-    running: &mut Running,
-    place: &Place,
-) -> Option<&'static str> {
-    let client = session.client().clone();
-    let hub = session.hub().clone();
-    let outbox = &client.outbox;
-    let limits = *hub.limits();
-    let opened = Instant::now();
-    let mut progress = opened;
-    let mut pending = Pending::default();
-    let mut reading = true;
-    // It has said that it sends nothing more.
-    let mut has_ended = false;
-    let mut gave_back = false;
-    let mut written = opened;
-    let mut flood = Flood::default();
-    let mut closing = None;
-    let mut has_place = session.is_authorised();
-    // What is still read of it at the end of the daemon.
-    let mut last_read: Option<usize> = None;
-    let mut tick = interval(limits.tick());
-    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    loop {
-        if let Some(end) = session.end()
-            && closing.is_none()
-        {
-            reading = false;
-            closing = Some(Some(end.reason()));
-            end.warn_of(&client.peer.name);
-            if let Some((delay, words)) = session.last_words() {
-                tokio::select! {
-                    () = sleep(delay) => {}
-                    () = place.lost() => return Some(MADE_ROOM),
-                    () = running.asked() => {}
-                }
-                outbox.reply(words);
-            }
-        }
-        if session.is_authorised() && !has_place && closing.is_none() {
-            has_place = true;
-            if let Err(fault) = place.become_of(Kind::Served, true) {
-                hub.turned_away(&fault);
-                outbox.reply(wire::error(&fault, 0, &[], 0));
-                reading = false;
-                closing = Some(Some("there is no place for it"));
-            }
-        }
-        let held = session.is_held();
-        if has_ended && !held && !gave_back {
-            gave_back = true;
-            io.expect_notice(link::VANISHED.saturating_sub(limits.ping));
-            session.give_back();
-            place.only_watches();
-        }
-        // Whoever sent a request and nothing more still wants the answers.
-        if has_ended && !held && closing.is_none() && !outbox.level().watching {
-            closing = Some(None);
-        }
-        // Write what there is without asking: there nearly always is room.
-        let mut blocked = false;
-        let mut turns = 0;
-        while pending.fill(outbox) {
-            // A client that takes as fast as is made must not keep this task from all else.
-            if turns == TURNS {
-                break;
-            }
-            turns += 1;
-            match pending.write(io) {
-                Ok(n) => {
-                    count(&hub.counters.bytes_out, n);
-                    progress = Instant::now();
-                    written = progress;
-                }
-                Err(e) if e.kind() == io::ErrorKind::WouldBlock => {
-                    blocked = true;
-                    break;
-                }
-                Err(_) => return closing.flatten(),
-            }
-        }
-        if closing.is_some() || (last_read.is_some() && !reading && !held) {
-            running.has_read();
-        }
-        if outbox.full().is_some() && closing.is_none() {
-            return Some("it does not read the replies to what it sends");
-        }
-        let hurry = turns == TURNS && !blocked;
-        if !blocked
-            && !hurry
-            && let Some(reason) = closing
-            && !outbox.owes_answer()
-        {
-            linger(io).await;
-            return reason;
-        }
-        if !blocked {
-            // Nothing waits: the clock of progress stands still.
-            progress = Instant::now();
-        }
-        let reads = reading && !held && !flood.must_wait();
-        tokio::select! {
-            () = flood.wait(&hub), if flood.must_wait() && !held => {}
-            () = ready(()), if held && closing.is_none() && session.may_go_on() => {
-                yield_now().await;
-                let _turn = hub.turn(session.is_asking()).await;
-                with_read_buffer(|_, scratch| session.go_on(scratch));
-            }
-            readable = io.readable(), if reads && last_read.is_none() => {
-                let _turn = hub.turn(session.is_asking()).await;
-                let read = readable.and_then(|()| with_read_buffer(|buffer, scratch| {
-                    let most = flood.most(buffer.len());
-                    let n = io.try_read(buffer.get_mut(..most).unwrap_or_default())?;
-                    flood.read(n, most);
-                    session.bytes(buffer.get(..n).unwrap_or_default(), now(), scratch);
-                    Ok(n)
-                }));
-                match read {
-                    Ok(0) => {
-                        reading = false;
-                        has_ended = true;
-                        with_read_buffer(|_, scratch| session.finish(now(), scratch));
-                    }
-                    Ok(_) => place.heard(),
-                    Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
-                    Err(_) => return None,
-                }
-            }
-            // What has arrived is still taken, also what the kernel has and the reactor has not yet told
-            // of.
-            () = ready(()), if reading && !held && last_read.is_some() => {
-                yield_now().await;
-                let _turn = hub.turn(session.is_asking()).await;
-                let read = with_read_buffer(|buffer, scratch| {
-                    let n = io.try_read(buffer)?;
-                    session.bytes(buffer.get(..n).unwrap_or_default(), now(), scratch);
-                    io::Result::Ok(n)
-                });
-                let left = last_read.unwrap_or(0);
-                match read {
-                    Ok(n) if n > 0 && n < left => last_read = Some(left - n),
-                    Ok(0) => {
-                        reading = false;
-                        with_read_buffer(|_, scratch| session.finish(now(), scratch));
-                    }
-                    _ => reading = false,
-                }
-            }
-            ready = io.writable(), if blocked => {
-                if ready.is_err() {
-                    return None;
-                }
-            }
-            () = outbox.filled(), if !blocked && !hurry => {}
-            () = yield_now(), if hurry => {}
-            () = place.lost() => {
-                outbox.reply(wire::error(&place.made_room(), 0, &[], 0));
-                if pending.fill(outbox) {
-                    // What has no room now comes too late.
-                    let _ = pending.write(io);
-                }
-                return Some(MADE_ROOM);
-            }
-            _ = tick.tick() => {
-                if has_ended && io.is_closed() {
-                    return None;
-                }
-                if has_ended && !D::SHOWS_CLOSE && !blocked && written.elapsed() >= limits.ping {
-                    outbox.reply(wire::heartbeat(limits.ping));
-                }
-                if blocked && progress.elapsed() >= limits.no_progress {
-                    return Some("it took nothing for too long");
-                }
-                if reading && !session.has_spoken() && opened.elapsed() >= limits.first_line {
-                    let fault = Fault::new("first_line_timeout", "no line came in time; the connection is closed");
-                    outbox.reply(wire::error(&fault, 0, &[], 0));
-                    reading = false;
-                    closing = Some(Some("no first line"));
-                }
-            }
-            () = running.asked_further(last_read.is_some()), if closing.is_none() => {
-                if last_read.is_some() {
-                    closing = Some(None);
-                } else {
-                    let _ = timeout(SETTLE, io.readable()).await;
-                    last_read = Some(LAST_READ);
-                }
-            }
-        }
     }
 }
 

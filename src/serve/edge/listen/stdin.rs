@@ -1,9 +1,9 @@
 //! Standard input -> a session. I/O.
 
-use crate::serve::core::hub::{Flood, Hub};
+use crate::serve::core::hub::{Complaint, Flood, Hub};
 use crate::serve::core::read_buffer::{now, with_read_buffer};
 use crate::serve::core::session::{Session, Side};
-use std::collections::VecDeque;
+use crate::serve::guard::log_throttle;
 use std::io::Read;
 use std::sync::Arc;
 
@@ -12,7 +12,6 @@ use std::sync::Arc;
 pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
     let side = Side::Deaf { trusted: true };
     let mut session = Session::with(hub, "standard input".to_owned(), side);
-    let mut said = VecDeque::new();
     let mut flood = Flood::default();
     loop {
         flood.wait_in_thread(hub);
@@ -26,12 +25,16 @@ pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
             std::io::Result::Ok(n)
         });
         loop {
-            session.client().outbox.discard(&mut said);
-            for line in said.drain(..) {
-                let line = String::from_utf8_lossy(&line);
-                if line.contains("\"class\":\"ERROR\"") {
-                    let what = format!("standard input: {}", line.trim_end());
-                    crate::serve::guard::log_throttle::warn("stdin", &what);
+            for Complaint { fault, line, .. } in session.complaints() {
+                // While nothing of it is used, that is said with a count of what is not.
+                if session.has_sent() || !fault.is_loss() {
+                    let at = if line > 0 {
+                        format!(", line {line}")
+                    } else {
+                        String::new()
+                    };
+                    let what = format!("standard input{at}: {}", fault.in_words());
+                    log_throttle::warn("stdin", &what);
                 }
             }
             if !session.is_held() {

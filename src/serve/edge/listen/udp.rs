@@ -8,8 +8,7 @@ use crate::serve::core::read_buffer::{now, with_read_buffer};
 use crate::serve::core::session::{Session, Side};
 use crate::serve::guard::fault::Fault;
 use crate::serve::guard::peer::Peer;
-use bytes::Bytes;
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::net::SocketAddr;
 use tokio::net::UdpSocket;
 use tokio::task::yield_now;
@@ -32,7 +31,6 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
     let silence = hub.limits().sender_silence;
     let mut senders: HashMap<SocketAddr, Sender> = HashMap::new();
     let mut buffer = vec![0; MAX_DATAGRAM];
-    let mut unheard = VecDeque::new();
     let mut tick = interval(silence / 4);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -58,7 +56,7 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                 });
                 sender.heard = Instant::now();
                 let datagram = buffer.get(..n).unwrap_or_default();
-                take(&mut sender.session, datagram, &mut unheard).await;
+                take(&mut sender.session, datagram).await;
                 if sender.session.end().is_some() {
                     senders.remove(&peer);
                 }
@@ -69,7 +67,7 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                     while let Ok((n, peer)) = socket.try_recv_from(&mut buffer) {
                         if let Some(sender) = senders.get_mut(&peer) {
                             let datagram = buffer.get(..n).unwrap_or_default();
-                            take(&mut sender.session, datagram, &mut unheard).await;
+                            take(&mut sender.session, datagram).await;
                         }
                     }
                 };
@@ -81,11 +79,10 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
 }
 
 /// Takes a datagram, step by step. What would be answered goes nowhere.
-async fn take(session: &mut Session, datagram: &[u8], unheard: &mut VecDeque<Bytes>) {
+async fn take(session: &mut Session, datagram: &[u8]) {
     with_read_buffer(|_, scratch| session.message(datagram, now(), scratch));
     loop {
-        session.client().outbox.discard(unheard);
-        unheard.clear();
+        session.complaints();
         if !session.is_held() {
             return;
         }

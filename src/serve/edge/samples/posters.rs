@@ -4,10 +4,10 @@
 
 use crate::serve::core::hub::{Asker, Client, Feedback, Flood, Hub, count, rates_in};
 use crate::serve::core::owned::Owned;
-use crate::serve::core::stream::run::{Placed, SampleRun};
+use crate::serve::core::run_builder::RunBuilder;
+use crate::serve::core::stream::run::SampleRun;
 use crate::serve::edge::http::answer::response;
 use crate::serve::guard::fault::Fault;
-use crate::serve::guard::log_throttle;
 use crate::serve::guard::losses::Lost;
 use crate::serve::guard::peer::{Origin, Peer};
 use crate::serve::protocol::wire::{self, Message};
@@ -18,8 +18,7 @@ use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
-use strapd_recording::decode::{Bare, Line, Objects};
-use strapd_recording::text::MAX_NEAR;
+use strapd_recording::decode::{Line, Objects};
 use tokio::time::{Instant, sleep};
 
 /// Samples published at once: what is made of them must find room with those who watch.
@@ -45,8 +44,6 @@ pub(super) struct Poster {
     hub: Arc<Hub>,
     client: Arc<Client>,
     owned: Owned,
-    /// Some of its samples were taken.
-    has_sent: bool,
 }
 
 /// Outcome of a body.
@@ -65,21 +62,6 @@ pub(super) struct Taken {
 enum Posted {
     Samples(Line),
     Reset(Result<wire::Reset, Fault>),
-}
-
-/// Samples of one sensor on their way to the hub.
-#[derive(Debug, Default)]
-struct Gathered {
-    head: Option<Line>,
-    samples: Vec<RawSample>,
-    /// Stamps that are bare numbers, at their places.
-    bare: Vec<Option<Bare>>,
-    /// The sender's number of each object, and where its samples end.
-    lines: Vec<(Option<u64>, usize)>,
-    /// The number of the first object, and its beginning.
-    first: (u64, Vec<u8>),
-    /// Room for encoding.
-    text: Vec<u8>,
 }
 
 impl Posters {
@@ -135,7 +117,6 @@ impl Poster {
             }),
             hub: hub.clone(),
             owned: Owned::default(),
-            has_sent: false,
         }
     }
 
@@ -147,22 +128,22 @@ impl Poster {
         received: Nanos,
     ) -> Taken {
         let mut taken = Taken::default();
-        let mut gathered = Gathered::default();
+        let mut run = RunBuilder::default();
         let mut in_a_row = 0;
         for object in objects {
             taken.objects += 1;
-            let before = gathered.samples.len();
+            let before = run.samples.len();
             let (number, near, read) = match object {
                 Ok(object) => (object.number, object.bytes, {
                     count(&self.hub.counters.bytes_in, object.bytes.len());
-                    self.sample(object.bytes, received, &mut gathered.samples)
+                    self.sample(object.bytes, received, &mut run.samples)
                 }),
                 Err((number, why)) => (number, &[][..], Err(wire::undecodable(&why))),
             };
             count(&self.hub.counters.lines, 1);
             match read {
                 Ok(Posted::Reset(mut asked)) => {
-                    self.publish(&mut gathered, usize::MAX, received, &mut taken)
+                    self.publish(&mut run, usize::MAX, received, &mut taken)
                         .await;
                     if let Ok(asked) = &mut asked {
                         asked.id = asked.id.take().or(name.map(str::to_owned));
@@ -175,32 +156,17 @@ impl Poster {
                 Ok(Posted::Samples(mut head)) => {
                     in_a_row = 0;
                     head.id = head.id.or(name.map(str::to_owned));
-                    let bare = std::mem::take(&mut head.bare);
-                    if gathered
-                        .head
-                        .as_ref()
-                        .is_some_and(|run| !run.goes_on_in(&head))
-                    {
-                        self.publish(&mut gathered, before, received, &mut taken)
-                            .await;
+                    if !run.goes_on_in(&head) {
+                        self.publish(&mut run, before, received, &mut taken).await;
                     }
-                    if !bare.is_empty() {
-                        let first = gathered.lines.last().map_or(0, |(_, end)| *end);
-                        gathered.bare.resize(first, None);
-                        gathered.bare.extend(bare);
-                    }
-                    gathered.lines.push((head.seq, gathered.samples.len()));
-                    if gathered.head.is_none() {
-                        gathered.first = (number, near.iter().take(MAX_NEAR).copied().collect());
-                        gathered.head = Some(head);
-                    }
-                    if gathered.samples.len() >= AT_ONCE {
-                        self.publish(&mut gathered, usize::MAX, received, &mut taken)
+                    run.add(head, (number, near));
+                    if run.samples.len() >= AT_ONCE {
+                        self.publish(&mut run, usize::MAX, received, &mut taken)
                             .await;
                     }
                 }
                 Err(fault) => {
-                    self.publish(&mut gathered, usize::MAX, received, &mut taken)
+                    self.publish(&mut run, usize::MAX, received, &mut taken)
                         .await;
                     self.owned.undecodable(&self.hub, &self.client);
                     taken.fault(&self.hub, &fault, number, near);
@@ -209,7 +175,7 @@ impl Poster {
                         fault: &fault,
                         first: (number, near),
                         count: 1,
-                        is_whole: !self.has_sent,
+                        is_whole: !self.owned.has_sent(),
                     });
                     in_a_row += 1;
                     if in_a_row > self.hub.limits().errors_in_a_row {
@@ -218,7 +184,7 @@ impl Poster {
                 }
             }
         }
-        self.publish(&mut gathered, usize::MAX, received, &mut taken)
+        self.publish(&mut run, usize::MAX, received, &mut taken)
             .await;
         taken
     }
@@ -249,80 +215,45 @@ impl Poster {
     /// Gives the first `until` samples gathered to the hub, not all at once.
     async fn publish(
         &mut self,
-        gathered: &mut Gathered,
+        gathered: &mut RunBuilder,
         until: usize,
         received: Nanos,
         taken: &mut Taken,
     ) {
-        let Some(head) = gathered.head.take() else {
+        let Some(run) = gathered.run(self.client.number, received, until) else {
             return;
         };
-        let until = until.min(gathered.samples.len());
-        let lines = std::mem::take(&mut gathered.lines);
-        let bare = std::mem::take(&mut gathered.bare);
+        let all = run.samples.len();
+        let mut text = Vec::new();
         let mut flood = Flood::default();
-        for from in (0..until).step_by(AT_ONCE) {
-            let to = (from + AT_ONCE).min(until);
-            let run = SampleRun {
-                client: self.client.number,
-                head: &head,
-                received,
-                placed: Placed::ByStamp,
-                lines: &within(&lines, from, to),
-                samples: gathered.samples.get(from..to).unwrap_or_default(),
-                bare: bare.get(from..to.min(bare.len())).unwrap_or_default(),
-                first: (gathered.first.0, &gathered.first.1),
+        for from in (0..all).step_by(AT_ONCE) {
+            let to = (from + AT_ONCE).min(all);
+            let part = SampleRun {
+                lines: &within(run.lines, from, to),
+                samples: run.samples.get(from..to).unwrap_or_default(),
+                bare: run
+                    .bare
+                    .get(from..to.min(run.bare.len()))
+                    .unwrap_or_default(),
+                ..run
             };
             match self
                 .owned
-                .publish(&self.hub, &self.client, &run, &mut gathered.text)
+                .publish(&self.hub, &self.client, &part, &mut text)
             {
-                Ok(Feedback { note, faults, lost }) => {
-                    taken.samples += rates_in(run.samples) as u64;
-                    self.has_sent = true;
-                    self.hub.losses.over(&self.client.peer.name);
-                    if let Some(note) = note {
-                        let id = run.id();
-                        log_throttle::info(
-                            &format!("run {id}"),
-                            &format!("{id}: {}", note.message),
-                        );
-                        taken.notes.push(format!("{id}: {}", note.message));
-                    }
-                    // Said once for a sensor, and counted for each object.
-                    let said = faults.len() as u64;
-                    for fault in faults {
-                        taken.fault(&self.hub, &fault, 0, &[]);
-                    }
-                    if let Some((fault, samples)) = lost {
-                        let objects = objects_of(run.lines, samples);
-                        taken.errors += objects.saturating_sub(said);
-                        let first = &run.first;
-                        taken
-                            .first
-                            .get_or_insert_with(|| wire::error_object(&fault, first.0, first.1, 0));
-                    }
-                }
+                Ok(feedback) => taken.part(&self.hub, &part, feedback),
                 Err(fault) => {
-                    count(&self.hub.counters.refused_samples, run.samples.len());
-                    self.hub.losses.add(&Lost {
-                        source: run.id(),
-                        fault: &fault,
-                        first: run.first,
-                        count: run.samples.len() as u64,
-                        is_whole: fault.code != "id_in_use",
-                    });
-                    taken.fault(&self.hub, &fault, run.first.0, run.first.1);
-                    taken.errors += (run.lines.len() as u64).saturating_sub(1);
+                    taken.fault(&self.hub, &fault, part.first.0, part.first.1);
+                    taken.errors += (part.lines.len() as u64).saturating_sub(1);
                 }
             }
-            if to < until || to - from == AT_ONCE {
+            if to < all || to - from == AT_ONCE {
                 flood.hold();
                 flood.wait(&self.hub).await;
                 tokio::task::yield_now().await;
             }
         }
-        gathered.samples.drain(..until);
+        gathered.clear(until);
     }
 }
 
@@ -353,6 +284,25 @@ fn within(lines: &[(Option<u64>, usize)], from: usize, to: usize) -> Vec<(Option
 }
 
 impl Taken {
+    /// Counts a part of a run that was used, and what is said of it.
+    fn part(&mut self, hub: &Hub, part: &SampleRun<'_>, Feedback { note, faults, lost }: Feedback) {
+        self.samples += rates_in(part.samples) as u64;
+        if let Some(note) = note {
+            self.notes.push(format!("{}: {}", part.id(), note.message));
+        }
+        // Said once for a sensor, and counted for each object.
+        let said = faults.len() as u64;
+        for fault in faults {
+            self.fault(hub, &fault, 0, &[]);
+        }
+        if let Some((fault, samples)) = lost {
+            self.errors += objects_of(part.lines, samples).saturating_sub(said);
+            let (number, near) = part.first;
+            self.first
+                .get_or_insert_with(|| wire::error_object(&fault, number, near, 0));
+        }
+    }
+
     fn fault(&mut self, hub: &Hub, fault: &Fault, number: u64, near: &[u8]) {
         count(&hub.counters.faults, 1);
         self.errors += 1;
