@@ -239,3 +239,24 @@ fn a_finding_is_a_row_of_the_table() {
     assert_eq!((found.code, &found.evidence["count"]), ("toy", &20.into()));
     assert_eq!(found_by(&[], &seen), []);
 }
+
+#[test]
+fn gravity_tells_the_unit_of_the_rates_and_where_they_disagree() {
+    // One radian a second about x, and what the gyro says of it.
+    let advice = |gyro: f64| {
+        let at = |n: i64| {
+            let angle = n as f64 * 0.005;
+            RawSample {
+                gyro: Some([gyro, 0.0, 0.0]),
+                accel: Some([0.0, 9.81 * angle.sin(), 9.81 * angle.cos()]),
+                ..sample(n)
+            }
+        };
+        let found = of_samples(&looked(&(0..2000).map(at).collect::<Vec<_>>()));
+        one(&found, "unit-against-gravity").map(Finding::flags)
+    };
+    assert_eq!(advice(1.0), None);
+    assert_eq!(advice(1_f64.to_degrees()), Some("gyro_unit deg".to_owned()));
+    assert_eq!(advice(1000.0), Some("gyro_unit mrad".to_owned()));
+    assert_eq!(advice(-1.0), Some("body MAP, or gyro_unit deg".to_owned()));
+}
