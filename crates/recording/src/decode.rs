@@ -20,6 +20,7 @@
 
 mod fields;
 pub mod framing;
+mod handed;
 mod json;
 pub mod packed;
 mod protobuf;
@@ -34,6 +35,7 @@ mod stamp;
 mod stated;
 
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
+pub use handed::{Handed, HandedDecoders, Refused};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
 pub use json::objects::{Object, Objects};
 pub(crate) use refusal::defining;

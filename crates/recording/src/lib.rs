@@ -35,7 +35,7 @@
 //! | [`delimited`] | rows of a table, strapd's own or another maker's -> raw samples | pure |
 //! | `columns` | what columns of tables are called, and what a user says of them | pure |
 //! | `parquet` | tables in Parquet -> the rows of a table, as text | I/O |
-//! | `records` | records as MCAP has them, which other containers are transcribed to | pure |
+//! | [`records`] | records as MCAP has them, read and written, which other containers are transcribed to | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
 //! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
 //! | `rosbag2` | recordings of ROS 2 in SQLite -> the records MCAP has for them | pure |
@@ -72,7 +72,7 @@ mod parquet;
 pub mod pool;
 pub mod recognise;
 pub mod recording;
-mod records;
+pub mod records;
 mod rosbag2;
 mod sqlite;
 pub mod text;

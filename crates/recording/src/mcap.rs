@@ -28,7 +28,6 @@ mod list;
 mod lz4;
 mod messages;
 mod order;
-mod record;
 mod resync;
 mod scan;
 mod summary;
@@ -37,16 +36,18 @@ mod walk;
 mod workers;
 
 pub use crate::records::problem::{Problem, ProblemKind, Problems};
+pub use crate::records::record::{
+    AttachmentIndex, AttachmentRecord, Carried, ChannelRecord, ChunkHead, ChunkIndex, DataEnd,
+    Entries, Footer, HeaderRecord, MessageIndex, MessageRecord, MetadataIndex, MetadataRecord,
+    Record, SchemaRecord, Statistics, SummaryOffset,
+};
+pub use crate::records::{HEAD, MAGIC, op};
 pub use block::Compression;
 use block::Payload;
 pub use channels::{Channel, Schema};
 pub use list::{Listed, list};
 pub use messages::{Message, Tally};
 pub use order::{Lookahead, Order};
-pub use record::{
-    AttachmentIndex, AttachmentRecord, ChannelRecord, ChunkHead, ChunkIndex, Footer, MAGIC,
-    MessageRecord, Record, SchemaRecord, Statistics, op,
-};
 pub use scan::Facts;
 pub(crate) use survey::OURS;
 pub use survey::{ChannelSurvey, PassedChunks, Survey, survey};

@@ -3,11 +3,14 @@
 //! Below the readers: ULog and bags are transcribed to records here, which the reader of MCAP then takes.
 
 mod bytes;
-pub(crate) mod imu;
+pub mod cdr;
+pub mod imu;
 pub(crate) mod problem;
+pub mod record;
 pub(crate) mod transcript;
 
-pub(crate) use bytes::{Bytes, HEAD, head_at};
+pub use bytes::HEAD;
+pub(crate) use bytes::{Bytes, head_at};
 
 /// The eight bytes at both ends of an MCAP.
 pub const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";

@@ -3,8 +3,9 @@
 //! A stage of its own because these records lie outside the chunks, whose checksums do not cover them:
 //! an attachment carries its own, a metadata record has none and is judged by its lengths.
 
-use super::record::{AttachmentRecord, Record, op};
+use crate::records::op;
 use crate::records::problem::ProblemKind;
+use crate::records::record::{AttachmentRecord, Record};
 
 /// Bytes of an attachment's fields but for name, media type and data: two times, two lengths of
 /// four bytes and one of eight, and behind them the CRC.
@@ -39,6 +40,6 @@ fn crc_of(body: &[u8], attachment: &AttachmentRecord<'_>) -> u32 {
         data,
         ..
     } = attachment;
-    let covered = FIXED + name.len() + media_type.len() + data.len();
+    let covered = FIXED + name.len() + media_type.len() + data.0.len();
     crc32fast::hash(body.get(..covered).unwrap_or(body))
 }

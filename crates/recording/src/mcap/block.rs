@@ -6,10 +6,9 @@
 mod bag;
 
 use super::input::{Held, LogFile, Stretch};
-use super::record::op;
 use crate::records::problem::ProblemKind;
 use crate::records::transcript::Transcript;
-use crate::records::{HEAD, head_at};
+use crate::records::{HEAD, head_at, op};
 use std::io::{self, BufReader};
 use std::sync::Arc;
 

@@ -4,9 +4,10 @@
 //! before the message, in file order, says. A second, different definition makes a second channel,
 //! so that messages of two topics are never mixed under one id.
 
-use super::record::{ChannelRecord, SchemaRecord, op};
 use crate::format::Format;
+use crate::records::op;
 use crate::records::problem::{ProblemKind, Problems};
+use crate::records::record::{Body, ChannelRecord, SchemaRecord};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

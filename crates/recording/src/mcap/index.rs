@@ -12,7 +12,7 @@
 use super::Limits;
 use super::block::Compression;
 use super::channels::Fallback;
-use super::record::{ChunkIndex, Statistics};
+use crate::records::record::{ChunkIndex, Statistics};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 

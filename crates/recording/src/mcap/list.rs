@@ -5,12 +5,12 @@
 
 use super::block::Buffers;
 use super::container::scan;
-use super::record::Record;
 use super::scan::{Besides, Item};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
 use crate::records::problem::{ProblemKind, Problems};
+use crate::records::record::Record;
 use crate::records::{HEAD, head_at};
 use std::ops::ControlFlow;
 

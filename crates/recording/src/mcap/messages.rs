@@ -5,9 +5,9 @@
 
 use super::channels::{Channel, NONE, Table};
 use super::order::{Batch, PIECE};
-use super::record::{MessageRecord, op};
 use crate::records::problem::ProblemKind;
-use crate::records::{HEAD, head_at};
+use crate::records::record::MessageRecord;
+use crate::records::{HEAD, head_at, op};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

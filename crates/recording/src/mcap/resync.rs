@@ -6,8 +6,8 @@
 
 use super::block::Compression;
 use super::input::Tape;
-use super::record::{ChunkHead, op};
-use crate::records::{HEAD, head_at};
+use crate::records::record::{Body, ChunkHead};
+use crate::records::{HEAD, head_at, op};
 use std::io;
 
 /// Bytes searched at a time.
@@ -57,7 +57,7 @@ fn length(data: &[u8], limit: u64) -> Option<u64> {
     let (_, length) = head_at(data, 0)?;
     let body = data.get(HEAD..)?;
     let body = body.get(..SIGNATURE - HEAD).unwrap_or(body);
-    let (head, _) = ChunkHead::parse(body)?;
+    let head = ChunkHead::parse(body)?;
     let compression = Compression::named(head.compression)?;
     let sizes = match compression {
         Compression::None => head.compressed_size == head.uncompressed_size,

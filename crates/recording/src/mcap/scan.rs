@@ -11,11 +11,11 @@ use super::block::{Block, Compression, Kind, Payload};
 use super::container::Container;
 use super::index::Passed;
 use super::input::{Held, Input, Tape};
-use super::record::{MAGIC, Record, op};
 use super::resync;
 use crate::format::Format;
 use crate::records::problem::{ProblemKind, Problems};
-use crate::records::{HEAD, head_at};
+use crate::records::record::{DataEnd, HeaderRecord, MetadataRecord, Record};
+use crate::records::{HEAD, MAGIC, head_at, op};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
 
@@ -327,23 +327,25 @@ impl Scanner {
             .get(HEAD..all)
             .and_then(|body| Record::parse(opcode, body))
         {
-            Some(Record::Header { profile, library }) if self.facts.profile.is_empty() => {
+            Some(Record::Header(HeaderRecord { profile, library }))
+                if self.facts.profile.is_empty() =>
+            {
                 self.facts.profile = profile.to_owned();
                 self.facts.library = library.to_owned();
             }
-            Some(Record::Metadata {
+            Some(Record::Metadata(MetadataRecord {
                 name: "strapd",
                 metadata,
-            }) if self.facts.provenance.is_empty() => {
+            })) if self.facts.provenance.is_empty() => {
                 self.facts.provenance = metadata
                     .into_iter()
                     .map(|(key, value)| (key.to_owned(), value.to_owned()))
                     .collect();
             }
             Some(Record::Statistics(s)) => self.claimed = Some(s.message_count),
-            Some(Record::DataEnd {
+            Some(Record::DataEnd(DataEnd {
                 data_section_crc: stored,
-            }) if stored != 0 => {
+            })) if stored != 0 => {
                 if let Some(computed) = self.crc.take().map(crc32fast::Hasher::finalize)
                     && computed != stored
                 {

@@ -80,7 +80,7 @@ impl<'a> Bytes<'a> {
 }
 
 /// The nine bytes before every record: opcode and length of the body.
-pub(crate) const HEAD: usize = 9;
+pub const HEAD: usize = 9;
 
 /// Opcode and body length of the record at `at`, or `None` where fewer than nine bytes are left.
 #[inline]

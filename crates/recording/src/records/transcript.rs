@@ -4,7 +4,8 @@
 //! channels and messages here, and what follows (definitions, workers, order, counting) cannot tell.
 
 use super::op;
-use crate::records::problem::Problems;
+use super::problem::Problems;
+use super::record::{ChannelRecord, MessageRecord, SchemaRecord};
 use std::fmt::Debug;
 
 /// Records one after another, as they would lie in a chunk.
@@ -57,12 +58,13 @@ pub(crate) trait Transcribe: Debug {
 impl Transcript {
     /// A layout of payloads; `id` is not 0.
     pub(crate) fn schema(&mut self, id: u16, name: &str, encoding: &str, data: &[u8]) {
-        self.record(op::SCHEMA, |body| {
-            body.extend(id.to_le_bytes());
-            blob(name.as_bytes(), body);
-            blob(encoding.as_bytes(), body);
-            blob(data, body);
-        });
+        let schema = SchemaRecord {
+            id,
+            name,
+            encoding,
+            data,
+        };
+        schema.push(&mut self.bytes);
     }
 
     /// A stream of messages; a `schema_id` of 0 names none.
@@ -74,35 +76,27 @@ impl Transcript {
         message_encoding: &str,
         metadata: &[(&str, &str)],
     ) {
-        self.record(op::CHANNEL, |body| {
-            body.extend(id.to_le_bytes());
-            body.extend(schema_id.to_le_bytes());
-            blob(topic.as_bytes(), body);
-            blob(message_encoding.as_bytes(), body);
-            let of = |(key, value): &(&str, &str)| 8 + key.len() + value.len();
-            let length: usize = metadata.iter().map(of).sum();
-            body.extend(length_of(length));
-            for (key, value) in metadata {
-                blob(key.as_bytes(), body);
-                blob(value.as_bytes(), body);
-            }
-        });
+        let channel = ChannelRecord {
+            id,
+            schema_id,
+            topic,
+            message_encoding,
+            metadata: metadata.to_vec(),
+        };
+        channel.push(&mut self.bytes);
     }
 
     /// A message, recorded and published at `time`.
     pub(crate) fn message(&mut self, channel: u16, sequence: u32, time: u64, data: &[u8]) {
-        self.record(op::MESSAGE, |body| {
-            body.extend(channel.to_le_bytes());
-            body.extend(sequence.to_le_bytes());
-            body.extend(time.to_le_bytes());
-            body.extend(time.to_le_bytes());
-            body.extend_from_slice(data);
-        });
+        let head = MessageRecord::head(channel, sequence, (time, time), data.len());
+        self.bytes.extend_from_slice(&head);
+        self.bytes.extend_from_slice(data);
     }
 
     /// Stands for a message that cannot be read.
     pub(crate) fn unreadable(&mut self) {
-        self.record(op::MESSAGE, |_| {});
+        self.bytes.push(op::MESSAGE);
+        self.bytes.extend([0; 8]);
     }
 
     /// The rest, of which `length` bytes are no record: whoever reads this stops here and says so.
@@ -110,25 +104,4 @@ impl Transcript {
         self.bytes.push(op::MESSAGE);
         self.bytes.extend(length.max(1).to_le_bytes());
     }
-
-    fn record(&mut self, opcode: u8, write: impl FnOnce(&mut Vec<u8>)) {
-        self.bytes.push(opcode);
-        let length_at = self.bytes.len();
-        self.bytes.extend([0; 8]);
-        write(&mut self.bytes);
-        let length = (self.bytes.len() - length_at - 8) as u64;
-        if let Some(slot) = self.bytes.get_mut(length_at..length_at + 8) {
-            slot.copy_from_slice(&length.to_le_bytes());
-        }
-    }
-}
-
-fn blob(bytes: &[u8], body: &mut Vec<u8>) {
-    body.extend(length_of(bytes.len()));
-    body.extend_from_slice(bytes);
-}
-
-/// Nothing that is written here comes near what a `u32` holds: records of the inputs are bounded.
-fn length_of(n: usize) -> [u8; 4] {
-    u32::try_from(n).unwrap_or(u32::MAX).to_le_bytes()
 }

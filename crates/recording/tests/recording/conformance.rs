@@ -4,7 +4,9 @@
 use serde_json::{Map, Value, json};
 use std::ops::ControlFlow;
 use std::path::Path;
-use strapd_recording::mcap::{Reader, Record, list, op};
+use strapd_recording::mcap::{
+    DataEnd, HeaderRecord, MetadataIndex, MetadataRecord, Reader, Record, SummaryOffset, list, op,
+};
 
 /// A record in the suite's notation: numbers as text, bytes as lists of numbers as text.
 fn notation(record: &Record<'_>) -> (&'static str, Value) {
@@ -26,7 +28,7 @@ fn notation(record: &Record<'_>) -> (&'static str, Value) {
         Value::Object(map)
     };
     match record {
-        Record::Header { profile, library } => {
+        Record::Header(HeaderRecord { profile, library }) => {
             ("Header", json!({"library": library, "profile": profile}))
         }
         Record::Footer(f) => (
@@ -66,7 +68,7 @@ fn notation(record: &Record<'_>) -> (&'static str, Value) {
             (
                 "Attachment",
                 json!({"log_time": n(a.log_time), "create_time": n(a.create_time),
-                "name": a.name, "media_type": a.media_type, "data": bytes(a.data)}),
+                "name": a.name, "media_type": a.media_type, "data": bytes(a.data.0)}),
             )
         }
         Record::AttachmentIndex(a) => (
@@ -86,28 +88,28 @@ fn notation(record: &Record<'_>) -> (&'static str, Value) {
                 "message_end_time": n(s.message_end_time),
                 "channel_message_counts": numbers(&s.channel_message_counts)}),
         ),
-        Record::Metadata { name, metadata } => (
+        Record::Metadata(MetadataRecord { name, metadata }) => (
             "Metadata",
             json!({"name": name, "metadata": texts(metadata)}),
         ),
-        Record::MetadataIndex {
+        Record::MetadataIndex(MetadataIndex {
             offset,
             length,
             name,
-        } => (
+        }) => (
             "MetadataIndex",
             json!({"offset": n(*offset), "length": n(*length), "name": name}),
         ),
-        Record::SummaryOffset {
+        Record::SummaryOffset(SummaryOffset {
             group_opcode,
             group_start,
             group_length,
-        } => (
+        }) => (
             "SummaryOffset",
             json!({"group_opcode": n((*group_opcode).into()), "group_start": n(*group_start),
                 "group_length": n(*group_length)}),
         ),
-        Record::DataEnd { data_section_crc } => (
+        Record::DataEnd(DataEnd { data_section_crc }) => (
             "DataEnd",
             json!({"data_section_crc": n((*data_section_crc).into())}),
         ),
@@ -142,7 +144,7 @@ fn ours(reader: Reader) -> Vec<(String, Value)> {
         // Message indexes are part of the file, not of the suite's listings.
         if !matches!(
             listed.record,
-            Record::MessageIndex { .. } | Record::Unknown { .. }
+            Record::MessageIndex(_) | Record::Unknown { .. }
         ) {
             let (name, fields) = notation(&listed.record);
             records.push((name.to_owned(), fields));
@@ -200,7 +202,8 @@ fn every_attachment_of_the_suite_has_the_crc_it_carries() {
         list(reader, |listed| {
             if let Record::Attachment(a) = listed.record {
                 // Everything of the record but the CRC itself, at the end of the known fields.
-                let covered = 8 + 8 + 4 + a.name.len() + 4 + a.media_type.len() + 8 + a.data.len();
+                let covered =
+                    8 + 8 + 4 + a.name.len() + 4 + a.media_type.len() + 8 + a.data.0.len();
                 assert_eq!(crc32(&listed.body[..covered]), a.crc);
                 assert_eq!(listed.body[covered..][..4], a.crc.to_le_bytes());
                 seen += 1;

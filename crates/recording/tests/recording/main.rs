@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
+mod another_reader;
 mod conformance;
 mod containers;
 mod decode;

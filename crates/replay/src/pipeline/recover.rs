@@ -17,7 +17,10 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Source;
-use strapd_recording::mcap::{self, Channel, Message, Order, Reader, Record, Survey, WalkOptions};
+use strapd_recording::mcap::{
+    self, Channel, HeaderRecord, Message, MetadataRecord, Order, Reader, Record, Survey,
+    WalkOptions,
+};
 use strapd_recording::pool::Pool;
 
 /// Request: what is to be recovered, and where to.
@@ -141,7 +144,7 @@ impl Copying<'_> {
     fn attach(&mut self, record: &Record<'_>) -> Result<()> {
         let pool = self.pool.rayon();
         match record {
-            Record::Header { profile, .. } => {
+            Record::Header(HeaderRecord { profile, .. }) => {
                 self.open(profile)?;
             }
             Record::Attachment(found) => {
@@ -150,13 +153,13 @@ impl Copying<'_> {
                     create_time: found.create_time,
                     name: found.name,
                     media_type: found.media_type,
-                    data: found.data,
+                    data: found.data.0,
                 };
                 let sink = self.open("")?;
                 still_wanted(sink.copy_attachment(&attachment, pool)?)?;
                 self.attachments += 1;
             }
-            Record::Metadata { name, metadata } => {
+            Record::Metadata(MetadataRecord { name, metadata }) => {
                 let map = metadata
                     .iter()
                     .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))

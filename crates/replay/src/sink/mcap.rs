@@ -9,7 +9,6 @@ pub(super) mod chunk;
 pub(super) mod file;
 pub(super) mod live;
 pub mod payload;
-pub(super) mod record;
 mod schemas;
 
 use super::batch::Batch;

@@ -9,10 +9,11 @@ use crate::decode::Decoded;
 use crate::decode::registers::{Form, is_mark};
 use crate::decode::schema::{builtin, rosmsg::Dialect};
 use crate::decode::select::select;
+use crate::records::imu;
 use strapd_attitude::record::{Nanos, RawSample};
 
-/// Bytes behind the header: 37 doubles.
-const BODY: usize = 37 * 8;
+/// Bytes behind the header.
+const BODY: usize = imu::NUMBERS * 8;
 
 /// Whether `plan` reads an Imu, everything of it, and nothing else.
 pub(crate) fn is_imu(plan: &Plan) -> bool {
@@ -69,7 +70,7 @@ pub(crate) fn ros1(
 pub(crate) fn orientation_covariance(payload: &[u8], is_cdr: bool) -> Option<[f64; 9]> {
     fn of<const BIG: bool>(data: &[u8], head: usize, align: usize) -> Option<[f64; 9]> {
         let body = Body::<BIG>::of(data, head, align)?;
-        Some(std::array::from_fn(|n| body.double(COVARIANCE + n)))
+        Some(std::array::from_fn(|n| body.double(imu::ORIENTATION_COVARIANCE + n)))
     }
     match payload.split_first_chunk::<4>() {
         Some(([0, 1, ..], data)) if is_cdr => of::<false>(data, 0, 8),
@@ -78,9 +79,6 @@ pub(crate) fn orientation_covariance(payload: &[u8], is_cdr: bool) -> Option<[f6
         _ => of::<false>(payload, 4, 1),
     }
 }
-
-/// Index of the first double of the orientation's covariance.
-const COVARIANCE: usize = 4;
 
 /// A payload that is all there: seconds, nanoseconds and the length of the frame's name, and the doubles behind it.
 struct Body<'a, const BIG: bool> {
@@ -140,23 +138,20 @@ fn sample<const BIG: bool>(
     let nanosec = word::<BIG>(body.header, 4);
     outcome.stamps_carried += usize::from(nanosec >= 1_000_000_000);
     outcome.samples = 1;
-    // Orientation x y z w, its covariance, rate, covariance, specific force, covariance.
-    let accel_is_absent = is_mark(double(28)) && !form.ignore_covariance_flag;
+    let [x, y, z, w] = std::array::from_fn(|n| double(imu::ORIENTATION + n));
+    let accel_is_absent = is_mark(double(imu::FORCE_COVARIANCE)) && !form.ignore_covariance_flag;
     Some(RawSample {
         header: Some(Nanos::from_sec_nanosec(sec, nanosec)),
         log,
         publish,
         gyro: form.gyro(
-            [double(13), double(14), double(15)],
-            is_mark(double(16)),
+            std::array::from_fn(|n| double(imu::RATE + n)),
+            is_mark(double(imu::RATE_COVARIANCE)),
             outcome,
         ),
-        accel: (!accel_is_absent).then(|| [double(25), double(26), double(27)]),
+        accel: (!accel_is_absent).then(|| std::array::from_fn(|n| double(imu::FORCE + n))),
         mag: None,
-        orientation: form.orientation(
-            [double(3), double(0), double(1), double(2)],
-            is_mark(double(COVARIANCE)),
-        ),
+        orientation: form.orientation([w, x, y, z], is_mark(double(imu::ORIENTATION_COVARIANCE))),
         orientation_resets: None,
         interval_nanos: None,
         is_beside: false,

@@ -7,14 +7,13 @@ use super::super::Limits;
 use super::super::block::{Block, Compression, Kind, Payload};
 use super::super::channels::Fallback;
 use super::super::input::{Input, LogFile, Tape};
-use super::super::record::op as record_op;
 use super::super::scan::{Facts, Item};
 use super::Container;
 use crate::bag::{self, Head, op};
 use crate::format::Format;
 use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::Transcript;
-use crate::records::{HEAD, head_at};
+use crate::records::{HEAD, head_at, op as record_op};
 use std::io;
 use std::sync::Arc;
 

@@ -5,11 +5,11 @@
 
 use super::super::block::{Block, Compression, Kind, Payload};
 use super::super::input::Input;
-use super::super::record::{ChunkHead, op};
 use super::super::resync;
 use super::{Besides, Item, PEEK, SLACK, Scanner, Section};
 use crate::records::problem::ProblemKind;
-use crate::records::{HEAD, head_at};
+use crate::records::record::{Body, ChunkHead};
+use crate::records::{HEAD, head_at, op};
 use std::io;
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ impl Scanner {
         let ahead = self.tape.available(most, peek)?;
         let head = ahead.get(HEAD..).and_then(|body| {
             let body = body.get(..most - HEAD).unwrap_or(body);
-            ChunkHead::parse(body).map(|(head, _)| head)
+            ChunkHead::parse(body)
         });
         let total = length.saturating_add(HEAD as u64);
         let Some(head) = head else {

@@ -4,8 +4,10 @@
 //! Within a stream only numbers change from message to message, always at the same places. So each
 //! stream lays its record out once and then copies and patches it: about 30 ns a message.
 
-use super::record::{MESSAGE_HEAD, message_head};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
+use strapd_recording::mcap::MessageRecord;
+use strapd_recording::records::cdr::{Cdr, put};
+use strapd_recording::records::imu;
 
 /// Template: where the numbers of a message record begin, and the record with zeros in their places.
 #[derive(Debug)]
@@ -17,57 +19,14 @@ struct Template {
     numbers: usize,
 }
 
-/// CDR, version 1, little endian: items are aligned to their size, counted from behind the four
-/// bytes of the encapsulation.
-struct Cdr {
-    bytes: Vec<u8>,
-}
-
-impl Cdr {
-    fn new() -> Cdr {
-        Cdr {
-            bytes: vec![0, 1, 0, 0],
-        }
-    }
-    fn align(&mut self, to: usize) {
-        while !(self.bytes.len() - 4).is_multiple_of(to) {
-            self.bytes.push(0);
-        }
-    }
-    fn u32(&mut self, v: u32) {
-        self.align(4);
-        self.bytes.extend_from_slice(&v.to_le_bytes());
-    }
-    /// The length counts the closing NUL.
-    fn string(&mut self, v: &str) {
-        self.u32(v.len() as u32 + 1);
-        self.bytes.extend_from_slice(v.as_bytes());
-        self.bytes.push(0);
-    }
-    /// Seconds and nanoseconds; returns where they are.
-    fn stamp(&mut self) -> usize {
-        self.align(4);
-        let at = self.bytes.len();
-        self.bytes.extend_from_slice(&[0; 8]);
-        at
-    }
-    /// `count` f64; returns where they are.
-    fn numbers(&mut self, count: usize) -> usize {
-        self.align(8);
-        let at = self.bytes.len();
-        self.bytes.resize(at + 8 * count, 0);
-        at
-    }
-}
-
 impl Template {
-    fn new(channel: u16, cdr: Cdr, stamp: usize, numbers: usize) -> Template {
-        let mut record = message_head(channel, 0, 0, 0, cdr.bytes.len()).to_vec();
-        record.extend_from_slice(&cdr.bytes);
+    fn new(channel: u16, (payload, stamp, numbers): (Vec<u8>, usize, usize)) -> Template {
+        let mut record = MessageRecord::head(channel, 0, (0, 0), payload.len()).to_vec();
+        record.extend_from_slice(&payload);
         Template {
             record,
-            stamp: MESSAGE_HEAD + stamp,
-            numbers: MESSAGE_HEAD + numbers,
+            stamp: MessageRecord::HEAD + stamp,
+            numbers: MessageRecord::HEAD + numbers,
         }
     }
 
@@ -80,21 +39,25 @@ impl Template {
         log_time: u64,
         stamp: [u8; 8],
     ) -> &'a mut [u8] {
+        self.append_at(out, sequence, (log_time, log_time), stamp)
+    }
+
+    /// Appends a copy with these log and publish times.
+    fn append_at<'a>(
+        &self,
+        out: &'a mut Vec<u8>,
+        sequence: u32,
+        times: (u64, u64),
+        stamp: [u8; 8],
+    ) -> &'a mut [u8] {
         let start = out.len();
         out.extend_from_slice(&self.record);
         let record = &mut out[start..];
-        record[11..15].copy_from_slice(&sequence.to_le_bytes());
-        record[15..23].copy_from_slice(&log_time.to_le_bytes());
-        record[23..31].copy_from_slice(&log_time.to_le_bytes());
+        if let Some(head) = record.first_chunk_mut() {
+            MessageRecord::number(head, sequence, times);
+        }
         record[self.stamp..self.stamp + 8].copy_from_slice(&stamp);
         &mut record[self.numbers..]
-    }
-}
-
-/// Writes `v` as f64 from number `at` on.
-fn put<const N: usize>(numbers: &mut [u8], at: usize, v: [f64; N]) {
-    for (place, value) in numbers[8 * at..].chunks_exact_mut(8).zip(v) {
-        place.copy_from_slice(&value.to_le_bytes());
     }
 }
 
@@ -117,11 +80,7 @@ pub(crate) struct Imu(Template);
 
 impl Imu {
     pub(super) fn new(channel: u16, frame_id: &str) -> Imu {
-        let mut cdr = Cdr::new();
-        let stamp = cdr.stamp();
-        cdr.string(frame_id);
-        let numbers = cdr.numbers(4 + 9 + 3 + 9 + 3 + 9);
-        Imu(Template::new(channel, cdr, stamp, numbers))
+        Imu(Template::new(channel, imu::empty(Cdr::default(), frame_id)))
     }
 
     /// Bytes of one message record.
@@ -142,16 +101,20 @@ impl Imu {
     ) {
         let numbers = self.0.append(out, sequence, log_time, stamp);
         let [w, x, y, z] = sample.q_nb.wxyz();
-        put(numbers, 0, [x, y, z, w]);
+        put(numbers, imu::ORIENTATION, [x, y, z, w]);
         let p = sample.covariance.in_navigation_axes(&sample.q_nb);
         if p.iter().all(|v| v.is_finite()) {
             // Symmetric: columns are rows.
-            put::<9>(numbers, 4, std::array::from_fn(|i| p[i]));
+            put::<9>(
+                numbers,
+                imu::ORIENTATION_COVARIANCE,
+                std::array::from_fn(|i| p[i]),
+            );
         }
-        put(numbers, 13, sample.rate.into());
+        put(numbers, imu::RATE, sample.rate.into());
         match sample.accel {
-            Some(accel) => put(numbers, 25, accel.into()),
-            None => put(numbers, 28, [-1.0]),
+            Some(accel) => put(numbers, imu::FORCE, accel.into()),
+            None => put(numbers, imu::FORCE_COVARIANCE, [-1.0]),
         }
     }
 
@@ -167,8 +130,8 @@ impl Imu {
     ) {
         let numbers = self.0.append(out, sequence, log_time, stamp);
         // REP-145: a quaternion of no rotation, and a covariance that says it is none.
-        put(numbers, 3, [1.0, -1.0]);
-        for (vector, at) in [(sample.gyro, 13), (sample.accel, 25)] {
+        put(numbers, imu::ORIENTATION + 3, [1.0, -1.0]);
+        for (vector, at) in [(sample.gyro, imu::RATE), (sample.accel, imu::FORCE)] {
             match vector {
                 Some(vector) => put(numbers, at, vector),
                 None => put(numbers, at + 3, [-1.0]),
@@ -184,11 +147,11 @@ pub(crate) struct Stamped<const N: usize>(Template);
 
 impl<const N: usize> Stamped<N> {
     pub(super) fn new(channel: u16, frame_id: &str) -> Self {
-        let mut cdr = Cdr::new();
+        let mut cdr = Cdr::default();
         let stamp = cdr.stamp();
         cdr.string(frame_id);
         let numbers = cdr.numbers(N);
-        Stamped(Template::new(channel, cdr, stamp, numbers))
+        Stamped(Template::new(channel, (cdr.into_bytes(), stamp, numbers)))
     }
 
     /// Bytes of one message record.
@@ -220,22 +183,21 @@ impl Imu {
         stamp: [u8; 8],
         sample: &RawSample,
     ) {
-        let start = out.len();
         let [log_time, publish_time] = times;
-        let numbers = self.0.append(out, sequence, log_time, stamp);
+        let times = (log_time, publish_time);
+        let numbers = self.0.append_at(out, sequence, times, stamp);
         match sample.orientation {
-            Some([w, x, y, z]) => put(numbers, 0, [x, y, z, w]),
-            None => put(numbers, 4, [-1.0]),
+            Some([w, x, y, z]) => put(numbers, imu::ORIENTATION, [x, y, z, w]),
+            None => put(numbers, imu::ORIENTATION_COVARIANCE, [-1.0]),
         }
         match sample.gyro {
-            Some(gyro) => put(numbers, 13, gyro),
-            None => put(numbers, 16, [-1.0]),
+            Some(gyro) => put(numbers, imu::RATE, gyro),
+            None => put(numbers, imu::RATE_COVARIANCE, [-1.0]),
         }
         match sample.accel {
-            Some(accel) => put(numbers, 25, accel),
-            None => put(numbers, 28, [-1.0]),
+            Some(accel) => put(numbers, imu::FORCE, accel),
+            None => put(numbers, imu::FORCE_COVARIANCE, [-1.0]),
         }
-        out[start + 23..start + 31].copy_from_slice(&publish_time.to_le_bytes());
     }
 }
 
@@ -245,13 +207,13 @@ pub(crate) struct Tf(Template);
 
 impl Tf {
     pub(super) fn new(channel: u16, parent: &str, child: &str) -> Tf {
-        let mut cdr = Cdr::new();
+        let mut cdr = Cdr::default();
         cdr.u32(1);
         let stamp = cdr.stamp();
         cdr.string(parent);
         cdr.string(child);
         let numbers = cdr.numbers(3 + 4);
-        Tf(Template::new(channel, cdr, stamp, numbers))
+        Tf(Template::new(channel, (cdr.into_bytes(), stamp, numbers)))
     }
 
     /// Bytes of one message record.
@@ -294,7 +256,7 @@ mod tests {
         for n in 0..40 {
             let imu = Imu::new(1, &"f".repeat(n));
             let base = 4 + (12 + n + 1).next_multiple_of(8);
-            assert_eq!(imu.len() - MESSAGE_HEAD, base + 296, "{n}");
+            assert_eq!(imu.len() - MessageRecord::HEAD, base + 296, "{n}");
             let mut s = sample(Nanos(5_000_000_007));
             // A quarter turn about z: body x is world y, body y is world -x.
             let half = std::f64::consts::FRAC_1_SQRT_2;
@@ -309,7 +271,7 @@ mod tests {
             };
             let mut out = Vec::new();
             imu.append(&mut out, 0, 0, ros_time(s.stamp).0, &s);
-            let m = &out[MESSAGE_HEAD..];
+            let m = &out[MessageRecord::HEAD..];
             assert_eq!(m[..12], [0, 1, 0, 0, 5, 0, 0, 0, 7, 0, 0, 0]);
             assert_eq!(m[12..16], (n as u32 + 1).to_le_bytes());
             assert_eq!(m[16 + n], 0);
@@ -335,7 +297,7 @@ mod tests {
         s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, 1.0, 1.0));
         let mut out = Vec::new();
         imu.append(&mut out, 0, 0, [0; 8], &s);
-        let m = &out[MESSAGE_HEAD..];
+        let m = &out[MessageRecord::HEAD..];
         // base is 20 for an empty frame_id.
         assert!(
             m[52..52 + 72].iter().all(|b| *b == 0),
@@ -347,12 +309,12 @@ mod tests {
     #[test]
     fn the_tf_layout_is_the_measured_one() {
         let tf = Tf::new(2, "world", "imu_link");
-        assert_eq!(tf.len() - MESSAGE_HEAD, 100);
+        assert_eq!(tf.len() - MessageRecord::HEAD, 100);
         let mut s = sample(Nanos(0));
         s.q_nb = Quaternion::assume_unit([0.1, 0.2, 0.3, 0.4]);
         let mut out = Vec::new();
         tf.append(&mut out, 0, 0, [0; 8], &s);
-        let m = &out[MESSAGE_HEAD..];
+        let m = &out[MessageRecord::HEAD..];
         let xyzw: Vec<f64> = (0..4).map(|i| f64_at(m, 68 + 8 * i)).collect();
         assert_eq!(xyzw, [0.2, 0.3, 0.4, 0.1]);
     }

@@ -1,10 +1,10 @@
 //! Message records -> one compressed, indexed chunk. Pure.
 
-use super::record::{Body, CHUNK, MESSAGE_INDEX, PREFIX, message_head};
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_recording::mcap::{ChunkHead, Entries, MessageIndex, MessageRecord};
 
 /// Compression of chunks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -29,7 +29,7 @@ impl Compression {
         }
     }
 
-    fn in_file(self) -> &'static str {
+    pub(super) fn in_file(self) -> &'static str {
         match self {
             Compression::None => "",
             other => other.name(),
@@ -86,8 +86,6 @@ pub(super) struct Sealed {
     pub(super) index: Vec<(u16, u64, u64)>,
 }
 
-const ENTRY_BYTES: usize = 16;
-
 /// Buffers larger than this are not kept: one copied message may have been 64 MiB.
 const KEEP_BYTES: usize = 4 << 20;
 
@@ -126,7 +124,7 @@ impl Chunk {
 
     /// Notes that the message record about to be appended to `plain` is of this lane.
     pub(super) fn note(&mut self, lane: Lane, log_time: u64) {
-        let mut entry = [0; ENTRY_BYTES];
+        let mut entry = [0; Entries::LEN];
         entry[..8].copy_from_slice(&log_time.to_le_bytes());
         entry[8..].copy_from_slice(&(self.plain.len() as u64).to_le_bytes());
         self.entries[lane.0].extend_from_slice(&entry);
@@ -147,7 +145,7 @@ impl Chunk {
     ) {
         let lane = self.lane(channel);
         self.note(lane, log_time);
-        let head = message_head(channel, sequence, log_time, publish_time, data.len());
+        let head = MessageRecord::head(channel, sequence, (log_time, publish_time), data.len());
         self.plain.extend_from_slice(&head);
         self.plain.extend_from_slice(data);
     }
@@ -191,29 +189,29 @@ impl Chunk {
         sealed.index.clear();
         for (channel, lane) in &self.lanes {
             let entries = &self.entries[*lane];
-            let messages = (entries.len() / ENTRY_BYTES) as u64;
+            let messages = (entries.len() / Entries::LEN) as u64;
             sealed
                 .index
                 .push((*channel, sealed.tail.len() as u64, messages));
-            Body::begin(&mut sealed.tail, MESSAGE_INDEX)
-                .u16(*channel)
-                .sized(entries)
-                .end();
+            let index = MessageIndex {
+                channel_id: *channel,
+                entries: Entries(entries),
+            };
+            index.push(&mut sealed.tail);
         }
 
         let (start, end) = self.times.unwrap_or_default();
         sealed.head.clear();
-        Body::begin(&mut sealed.head, CHUNK)
-            .u64(start)
-            .u64(end)
-            .u64(self.plain.len() as u64)
-            .u32(crc32fast::hash(&self.plain))
-            .string(compression.in_file())
-            .u64(stored_len as u64)
-            .end();
+        let head = ChunkHead {
+            message_start_time: start,
+            message_end_time: end,
+            uncompressed_size: self.plain.len() as u64,
+            uncompressed_crc: crc32fast::hash(&self.plain),
+            compression: compression.in_file(),
+            compressed_size: stored_len as u64,
+        };
         // The record goes on with the data: its length counts them.
-        let length = (sealed.head.len() - PREFIX + stored_len) as u64;
-        sealed.head[1..PREFIX].copy_from_slice(&length.to_le_bytes());
+        head.push_with(stored_len as u64, &mut sealed.head);
         Ok(())
     }
 

@@ -4,12 +4,12 @@
 //! the first message that uses them: a damaged or lost chunk takes only its own messages with it.
 
 use super::chunk::{Chunk, Compression};
-use super::record::{
-    ATTACHMENT, ATTACHMENT_INDEX, Body, CHANNEL, CHUNK_INDEX, Channel, DATA_END, FOOTER, HEADER,
-    MAGIC, METADATA, METADATA_INDEX, PREFIX, SCHEMA, STATISTICS, SUMMARY_OFFSET, Schema,
-};
-
 use std::collections::BTreeMap;
+use strapd_recording::mcap::{
+    AttachmentIndex, AttachmentRecord, Carried, ChannelRecord, ChunkIndex, DataEnd, Footer, HEAD,
+    HeaderRecord, MAGIC, MetadataIndex, MetadataRecord, SchemaRecord, Statistics, SummaryOffset,
+    op,
+};
 
 /// A file carried inside another log, for a copy of it.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,55 @@ pub struct Attachment<'a> {
     pub media_type: &'a str,
     /// Bytes.
     pub data: &'a [u8],
+}
+
+/// Fields of a channel, kept for the summary.
+#[derive(Clone, Debug)]
+struct Channel {
+    id: u16,
+    /// 0: none.
+    schema: u16,
+    topic: String,
+    encoding: String,
+    metadata: BTreeMap<String, String>,
+}
+
+impl Channel {
+    fn push(&self, out: &mut Vec<u8>) {
+        let record = ChannelRecord {
+            id: self.id,
+            schema_id: self.schema,
+            topic: &self.topic,
+            message_encoding: &self.encoding,
+            metadata: pairs(&self.metadata),
+        };
+        record.push(out);
+    }
+}
+
+/// Fields of a schema, likewise.
+#[derive(Clone, Debug)]
+struct Schema {
+    id: u16,
+    name: String,
+    encoding: String,
+    text: Vec<u8>,
+}
+
+impl Schema {
+    fn push(&self, out: &mut Vec<u8>) {
+        let record = SchemaRecord {
+            id: self.id,
+            name: &self.name,
+            encoding: &self.encoding,
+            data: &self.text,
+        };
+        record.push(out);
+    }
+}
+
+fn pairs(map: &BTreeMap<String, String>) -> Vec<(&str, &str)> {
+    map.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect()
 }
 
 /// The bookkeeping of a file being written.
@@ -61,10 +110,11 @@ impl McapFile {
     /// The magic and the header.
     pub(in crate::sink) fn push_header(&self, out: &mut Vec<u8>, profile: &str) {
         out.extend_from_slice(&MAGIC);
-        Body::begin(out, HEADER)
-            .string(profile)
-            .string(concat!("strapd ", env!("CARGO_PKG_VERSION")))
-            .end();
+        let header = HeaderRecord {
+            profile,
+            library: concat!("strapd ", env!("CARGO_PKG_VERSION")),
+        };
+        header.push(out);
     }
 
     /// A metadata record, `out` being what is written next.
@@ -75,13 +125,15 @@ impl McapFile {
         map: &BTreeMap<String, String>,
     ) {
         let at = out.len();
-        Body::begin(out, METADATA).string(name).strings(map).end();
+        let metadata = pairs(map);
+        MetadataRecord { name, metadata }.push(out);
         self.metadata = self.metadata.saturating_add(1);
-        Body::begin(&mut self.metadata_index, METADATA_INDEX)
-            .u64(self.offset + at as u64)
-            .u64((out.len() - at) as u64)
-            .string(name)
-            .end();
+        let index = MetadataIndex {
+            offset: self.offset + at as u64,
+            length: (out.len() - at) as u64,
+            name,
+        };
+        index.push(&mut self.metadata_index);
     }
 
     /// An attachment record, `out` being what is written next.
@@ -93,29 +145,30 @@ impl McapFile {
         let at = out.len();
         // At once: growing would hold it twice.
         out.reserve(attachment.data.len() + 1024);
-        Body::begin(out, ATTACHMENT)
-            .u64(attachment.log_time)
-            .u64(attachment.create_time)
-            .string(attachment.name)
-            .string(attachment.media_type)
-            .u64(attachment.data.len() as u64)
-            .bytes(attachment.data)
-            .u32(0)
-            .end();
+        let record = AttachmentRecord {
+            log_time: attachment.log_time,
+            create_time: attachment.create_time,
+            name: attachment.name,
+            media_type: attachment.media_type,
+            data: Carried(attachment.data),
+            crc: 0,
+        };
+        record.push(out);
         // The checksum covers the body up to itself.
         let covered = out.len() - 4;
-        let crc = crc32fast::hash(&out[at + PREFIX..covered]);
+        let crc = crc32fast::hash(&out[at + HEAD..covered]);
         out[covered..].copy_from_slice(&crc.to_le_bytes());
         self.attachments = self.attachments.saturating_add(1);
-        Body::begin(&mut self.attachment_index, ATTACHMENT_INDEX)
-            .u64(self.offset + at as u64)
-            .u64((out.len() - at) as u64)
-            .u64(attachment.log_time)
-            .u64(attachment.create_time)
-            .u64(attachment.data.len() as u64)
-            .string(attachment.name)
-            .string(attachment.media_type)
-            .end();
+        let index = AttachmentIndex {
+            offset: self.offset + at as u64,
+            length: (out.len() - at) as u64,
+            log_time: attachment.log_time,
+            create_time: attachment.create_time,
+            data_size: attachment.data.len() as u64,
+            name: attachment.name,
+            media_type: attachment.media_type,
+        };
+        index.push(&mut self.attachment_index);
     }
 
     /// The identifier of a schema, with its record in `out` if it is new. `None`: no more fit.
@@ -178,25 +231,19 @@ impl McapFile {
         let (start, end) = chunk.times();
         let record_len = (head.len() + data.len()) as u64;
         let behind = self.offset + record_len;
-        let offsets: BTreeMap<u16, u64> = sealed
-            .index
-            .iter()
-            .map(|(channel, at, _)| (*channel, behind + at))
-            .collect();
-        Body::begin(&mut self.chunk_index, CHUNK_INDEX)
-            .u64(start)
-            .u64(end)
-            .u64(self.offset)
-            .u64(record_len)
-            .numbers(&offsets)
-            .u64(tail.len() as u64)
-            .string(match compression {
-                Compression::None => "",
-                other => other.name(),
-            })
-            .u64(data.len() as u64)
-            .u64(chunk.plain_len() as u64)
-            .end();
+        let offsets = sealed.index.iter();
+        let index = ChunkIndex {
+            message_start_time: start,
+            message_end_time: end,
+            chunk_start_offset: self.offset,
+            chunk_length: record_len,
+            message_index_offsets: offsets.map(|(id, at, _)| (*id, behind + at)).collect(),
+            message_index_length: tail.len() as u64,
+            compression: compression.in_file(),
+            compressed_size: data.len() as u64,
+            uncompressed_size: chunk.plain_len() as u64,
+        };
+        index.push(&mut self.chunk_index);
         self.chunks = self.chunks.saturating_add(1);
         for (channel, _, messages) in &sealed.index {
             *self.messages.entry(*channel).or_default() += messages;
@@ -210,9 +257,8 @@ impl McapFile {
     /// Everything behind the last chunk: the end of the data, the summary, the footer.
     pub(in crate::sink) fn closing(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        Body::begin(&mut out, DATA_END)
-            .u32(self.crc.clone().finalize())
-            .end();
+        let data_section_crc = self.crc.clone().finalize();
+        DataEnd { data_section_crc }.push(&mut out);
         let summary = out.len();
         let mut groups: Vec<(u8, usize, usize)> = Vec::new();
         let mut group = |out: &mut Vec<u8>, opcode: u8, write: &dyn Fn(&mut Vec<u8>)| {
@@ -222,40 +268,41 @@ impl McapFile {
                 groups.push((opcode, at, out.len() - at));
             }
         };
-        group(&mut out, SCHEMA, &|out| {
+        group(&mut out, op::SCHEMA, &|out| {
             self.schemas.iter().for_each(|s| s.push(out));
         });
-        group(&mut out, CHANNEL, &|out| {
+        group(&mut out, op::CHANNEL, &|out| {
             self.channels.iter().for_each(|c| c.push(out));
         });
-        group(&mut out, STATISTICS, &|out| self.push_statistics(out));
-        group(&mut out, CHUNK_INDEX, &|out| {
+        group(&mut out, op::STATISTICS, &|out| self.push_statistics(out));
+        group(&mut out, op::CHUNK_INDEX, &|out| {
             out.extend_from_slice(&self.chunk_index);
         });
-        group(&mut out, ATTACHMENT_INDEX, &|out| {
+        group(&mut out, op::ATTACHMENT_INDEX, &|out| {
             out.extend_from_slice(&self.attachment_index);
         });
-        group(&mut out, METADATA_INDEX, &|out| {
+        group(&mut out, op::METADATA_INDEX, &|out| {
             out.extend_from_slice(&self.metadata_index);
         });
 
         let offsets = out.len();
         let absolute = |at: usize| self.offset + at as u64;
-        for (opcode, at, length) in groups {
-            Body::begin(&mut out, SUMMARY_OFFSET)
-                .bytes(&[opcode])
-                .u64(absolute(at))
-                .u64(length as u64)
-                .end();
+        for (group_opcode, at, length) in groups {
+            let offset = SummaryOffset {
+                group_opcode,
+                group_start: absolute(at),
+                group_length: length as u64,
+            };
+            offset.push(&mut out);
         }
         // The summary's checksum covers the footer up to itself: length and both offsets included.
-        let footer = out.len();
-        Body::begin(&mut out, FOOTER)
-            .u64(absolute(summary))
-            .u64(absolute(offsets))
-            .u32(0)
-            .end();
-        let covered = footer + PREFIX + 16;
+        let footer = Footer {
+            summary_start: absolute(summary),
+            summary_offset_start: absolute(offsets),
+            summary_crc: 0,
+        };
+        footer.push(&mut out);
+        let covered = out.len() - 4;
         let crc = crc32fast::hash(&out[summary..covered]);
         out.truncate(covered);
         out.extend_from_slice(&crc.to_le_bytes());
@@ -266,24 +313,31 @@ impl McapFile {
     /// The shortest end there can be, without a summary: for a disk that has no room for one.
     pub(super) fn shortest_closing() -> Vec<u8> {
         let mut out = Vec::new();
-        Body::begin(&mut out, DATA_END).u32(0).end();
-        Body::begin(&mut out, FOOTER).u64(0).u64(0).u32(0).end();
+        let data_section_crc = 0;
+        DataEnd { data_section_crc }.push(&mut out);
+        let footer = Footer {
+            summary_start: 0,
+            summary_offset_start: 0,
+            summary_crc: 0,
+        };
+        footer.push(&mut out);
         out.extend_from_slice(&MAGIC);
         out
     }
 
     fn push_statistics(&self, out: &mut Vec<u8>) {
         let (start, end) = self.times.unwrap_or_default();
-        Body::begin(out, STATISTICS)
-            .u64(self.messages())
-            .u16(self.schemas.len() as u16)
-            .u32(self.channels.len() as u32)
-            .u32(self.attachments)
-            .u32(self.metadata)
-            .u32(self.chunks)
-            .u64(start)
-            .u64(end)
-            .numbers(&self.messages)
-            .end();
+        let statistics = Statistics {
+            message_count: self.messages(),
+            schema_count: self.schemas.len() as u16,
+            channel_count: self.channels.len() as u32,
+            attachment_count: self.attachments,
+            metadata_count: self.metadata,
+            chunk_count: self.chunks,
+            message_start_time: start,
+            message_end_time: end,
+            channel_message_counts: self.messages.iter().map(|(id, n)| (*id, *n)).collect(),
+        };
+        statistics.push(out);
     }
 }

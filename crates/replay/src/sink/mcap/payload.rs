@@ -3,10 +3,10 @@
 //! The same encoders and topics as in a file, for those who take messages one by one.
 
 use super::cdr::{self, ros_time};
-use super::record::MESSAGE_HEAD;
 use super::{IMU_SCHEMA, TF_SCHEMA, TF_TOPIC, schemas};
 use crate::sink::stream::{Content, Stream, named_frame, parent_frame};
 use strapd_attitude::record::{AttitudeSample, RawSample};
+use strapd_recording::mcap::MessageRecord;
 
 /// A topic and the type of its messages, all `cdr` described as `ros2msg`.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -136,6 +136,6 @@ impl Payloads {
 fn headless(out: &mut Vec<u8>, append: impl FnOnce(&mut Vec<u8>)) {
     let from = out.len();
     append(out);
-    let head = MESSAGE_HEAD.min(out.len() - from);
+    let head = MessageRecord::HEAD.min(out.len() - from);
     out.drain(from..from + head);
 }
