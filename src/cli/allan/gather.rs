@@ -19,7 +19,7 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::described;
 use strapd_recording::recording::opened::problems;
-use strapd_recording::recording::topic_reading::{Taken, TopicReading};
+use strapd_recording::recording::topic_reading::{TopicItem, TopicReading};
 
 /// Angles held at most: 24 bytes each, 200 MB.
 pub(super) const CAPACITY: usize = 1 << 23;
@@ -99,9 +99,9 @@ pub(super) fn gather(
     };
     let survey = reading.walk::<Error>(pool, |taken| {
         match taken {
-            Taken::Sample(_, raw) if raw.is_beside => {}
-            Taken::Sample(_, raw) => gathering.take(raw).map_err(fails)?,
-            Taken::Undecodable(..) => gathering.undecodable(),
+            TopicItem::Sample(_, raw) if raw.is_beside => {}
+            TopicItem::Sample(_, raw) => gathering.take(raw).map_err(fails)?,
+            TopicItem::Undecodable(..) => gathering.undecodable(),
         }
         Ok(ControlFlow::Continue(()))
     })?;

@@ -24,13 +24,13 @@ use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
 
 /// Channels that are read beside those of the samples.
 #[derive(Debug, Default)]
-pub struct Besides {
+pub struct AuxiliaryInputs {
     channels: Vec<(Arc<Channel>, Decoder)>,
     /// Notes on what was taken unnamed.
     pub notes: Vec<String>,
 }
 
-impl Besides {
+impl AuxiliaryInputs {
     /// Decoder of this channel's messages beside the samples.
     pub fn decoder(&self, channel: &Channel) -> Option<&Decoder> {
         let mut channels = self.channels.iter();
@@ -38,7 +38,7 @@ impl Besides {
         Some(decoder)
     }
 
-    pub(super) fn append(&mut self, mut other: Besides) {
+    pub(super) fn append(&mut self, mut other: AuxiliaryInputs) {
         self.channels.append(&mut other.channels);
         self.notes.append(&mut other.notes);
     }
@@ -81,8 +81,8 @@ pub fn choose(
     path: &Path,
     log: &Recording,
     (own, has_field): (&str, bool),
-) -> Result<Besides> {
-    let mut besides = Besides::default();
+) -> Result<AuxiliaryInputs> {
+    let mut besides = AuxiliaryInputs::default();
     if let Some(beside) = &selection.accel {
         besides.add(named(plan, Wanted::Forces, beside, path, log)?);
     }
@@ -103,8 +103,8 @@ pub fn choose(
 ///
 /// # Errors
 /// Several that may be meant, or none.
-pub(super) fn of_fields(plan: &Plan, log: &Recording, own: &str) -> Result<Besides> {
-    let mut besides = Besides::default();
+pub(super) fn of_fields(plan: &Plan, log: &Recording, own: &str) -> Result<AuxiliaryInputs> {
+    let mut besides = AuxiliaryInputs::default();
     besides.add(unnamed(plan, log.name(), log, own)?);
     Ok(besides)
 }

@@ -16,7 +16,7 @@ pub struct Route {
     /// Reads the samples in them; `None` when there are none.
     pub decoder: Option<Decoder>,
     /// Streams of the run to which they belong; of several, the one of the frame that a message names.
-    takers: Vec<Taker>,
+    takers: Vec<RouteTarget>,
     /// The channel's number, where it is not known beforehand whether channels take turns.
     turn: Option<usize>,
     /// Reads the recorded orientations in them to compare with.
@@ -31,7 +31,7 @@ pub struct Route {
 
 /// A stream, and what is noticed on its way there.
 #[derive(Clone, Debug)]
-pub struct Taker {
+pub struct RouteTarget {
     /// Index of the stream in the run.
     pub stream: usize,
     /// Notes for the summary.
@@ -148,7 +148,7 @@ impl Route {
         };
         Route::to(
             decoder,
-            vec![Taker {
+            vec![RouteTarget {
                 stream,
                 noticed: Arc::new(noticed),
             }],
@@ -157,7 +157,7 @@ impl Route {
 
     /// Messages that are samples of the stream whose frame they name, of these.
     #[must_use]
-    pub fn to(decoder: Decoder, takers: Vec<Taker>) -> Route {
+    pub fn to(decoder: Decoder, takers: Vec<RouteTarget>) -> Route {
         Route {
             decoder: Some(decoder),
             takers,
@@ -278,7 +278,7 @@ impl Route {
         let publish = nanos(message.publish_time);
         SCRATCH.with_borrow_mut(|samples| {
             samples.clear();
-            let Some(Taker { stream, noticed }) = self.taker(decoder, message.data) else {
+            let Some(RouteTarget { stream, noticed }) = self.taker(decoder, message.data) else {
                 return;
             };
             if let Some(number) = self.turn {
@@ -314,13 +314,13 @@ impl Route {
         });
     }
 
-    fn taker(&self, decoder: &Decoder, payload: &[u8]) -> Option<&Taker> {
+    fn taker(&self, decoder: &Decoder, payload: &[u8]) -> Option<&RouteTarget> {
         let first = self.takers.first();
         if self.takers.len() < 2 {
             return first;
         }
         let frame = decoder.frame_id(payload).unwrap_or_default();
-        let of = |taker: &&Taker| taker.noticed.frame_id.get() == Some(&frame);
+        let of = |taker: &&RouteTarget| taker.noticed.frame_id.get() == Some(&frame);
         self.takers.iter().find(of).or(first)
     }
 }

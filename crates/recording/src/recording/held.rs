@@ -3,7 +3,7 @@
 //!
 //! Apart from the stream because nothing else in it is looked at before it is read.
 
-use super::channel_route::{Copied, Item, Route, Taker};
+use super::channel_route::{Copied, Item, Route, RouteTarget};
 use super::decoders::Decoders;
 use super::log_channel::nanos;
 use super::sources::{OPENINGS, OPENINGS_LIMIT, keep};
@@ -17,7 +17,7 @@ pub struct Held {
     channel: Arc<Channel>,
     /// Decoder by which it will be read.
     decoder: Decoder,
-    taker: Taker,
+    taker: RouteTarget,
     /// Number among those of the topic.
     number: usize,
     copied: Option<Arc<Channel>>,
@@ -33,7 +33,7 @@ impl Held {
     pub fn new(
         channel: &Arc<Channel>,
         decoder: Decoder,
-        taker: Taker,
+        taker: RouteTarget,
         number: usize,
         copied: Option<Arc<Channel>>,
     ) -> Held {

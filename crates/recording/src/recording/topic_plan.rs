@@ -3,7 +3,7 @@
 //! Apart from the choice of topics because whoever walks a log needs the same of those chosen: an inspection, a replay,
 //! a command that wants samples alone.
 
-use super::channel_route::{Route, Taker};
+use super::channel_route::{Route, RouteTarget};
 use super::decoders::Decoders;
 use super::log_channel::{LogChannel, described};
 use super::opened::Recording;
@@ -122,7 +122,7 @@ impl<'l> TopicPlan<'l> {
 pub fn route<'p>(
     plans: impl Iterator<Item = &'p TopicPlan<'p>>,
     met: &Channel,
-    taker: impl Fn(usize, usize) -> Taker,
+    taker: impl Fn(usize, usize) -> RouteTarget,
 ) -> Option<Route> {
     let (mut decoder, mut takers) = (None, Vec::new());
     for (at, plan) in plans.enumerate() {

@@ -2,8 +2,8 @@
 //!
 //! Apart from the replay for who looks at samples and integrates none: which topic, by which decoders, and the walk.
 
-use super::beside::{self, Besides};
-use super::channel_route::{Item, Noticed, Route, Taker};
+use super::beside::{self, AuxiliaryInputs};
+use super::channel_route::{Item, Noticed, Route, RouteTarget};
 use super::decoders::Decoders;
 use super::log_channel::LogChannel;
 use super::opened::{AHEAD, Recording, problems};
@@ -27,12 +27,12 @@ pub struct TopicReading<'l> {
     /// Something to know about the choice.
     pub note: Option<String>,
     /// Topics that belong to these samples.
-    besides: Besides,
+    besides: AuxiliaryInputs,
 }
 
 /// Item that is read.
 #[derive(Debug)]
-pub enum Taken {
+pub enum TopicItem {
     /// A sample of the channel of this place.
     Sample(usize, RawSample),
     /// A payload that could not be decoded, and when it was logged (of a line: its number).
@@ -74,7 +74,7 @@ impl<'l> TopicReading<'l> {
             log,
             plan,
             note: None,
-            besides: Besides::default(),
+            besides: AuxiliaryInputs::default(),
         })
     }
 
@@ -137,7 +137,7 @@ impl<'l> TopicReading<'l> {
     pub fn walk<E: From<Error>>(
         &self,
         pool: &Pool,
-        mut take: impl FnMut(Taken) -> std::result::Result<ControlFlow<()>, E>,
+        mut take: impl FnMut(TopicItem) -> std::result::Result<ControlFlow<()>, E>,
     ) -> std::result::Result<Survey, E> {
         let each = std::slice::from_ref(self);
         walk(self.log, each, pool, |_, taken| take(taken))
@@ -167,13 +167,13 @@ pub(super) fn walk_in_flu<E: From<Error>>(
     let warn = log.input().warn();
     let mut undecodable = 0u64;
     let survey = walk(log, readings, pool, |reading, taken| match taken {
-        Taken::Sample(place, raw) => meanings
+        TopicItem::Sample(place, raw) => meanings
             .get(reading)
             .and_then(|meanings| meanings.get(place))
             .map_or(Ok(ControlFlow::Continue(())), |(meaning, kind)| {
                 take(reading, &meaning.in_flu(&raw), *kind)
             }),
-        Taken::Undecodable(at, why) => {
+        TopicItem::Undecodable(at, why) => {
             if undecodable == 0 {
                 warn.say(&format!(
                     "first undecodable payload, {}: {why}",
@@ -198,7 +198,7 @@ fn walk<E: From<Error>>(
     log: &Recording,
     readings: &[TopicReading<'_>],
     pool: &Pool,
-    mut take: impl FnMut(usize, Taken) -> std::result::Result<ControlFlow<()>, E>,
+    mut take: impl FnMut(usize, TopicItem) -> std::result::Result<ControlFlow<()>, E>,
 ) -> std::result::Result<Survey, E> {
     // A stream for each channel of each reading.
     let streams: Vec<(usize, usize)> = readings
@@ -218,7 +218,7 @@ fn walk<E: From<Error>>(
         pool,
         |met| {
             let plans = readings.iter().map(|reading| &reading.plan);
-            let samples = topic_plan::route(plans, met, |at, place| Taker {
+            let samples = topic_plan::route(plans, met, |at, place| RouteTarget {
                 stream: begins.get(at).map_or(0, |begin| begin + place),
                 noticed: noticed.get(at).cloned().unwrap_or_default(),
             });
@@ -242,8 +242,8 @@ fn walk<E: From<Error>>(
                 };
                 let (at, place) = streams.get(stream).copied().unwrap_or_default();
                 let taken = match raw {
-                    Ok(raw) => Taken::Sample(place, raw),
-                    Err(why) => Taken::Undecodable(why.0, why.1),
+                    Ok(raw) => TopicItem::Sample(place, raw),
+                    Err(why) => TopicItem::Undecodable(why.0, why.1),
                 };
                 if take(at, taken)?.is_break() {
                     return Ok(ControlFlow::Break(()));

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
-use strapd_recording::recording::topic_reading::{Taken, TopicReading};
+use strapd_recording::recording::topic_reading::{TopicItem, TopicReading};
 use strapd_recording::{Error, Input, Recording, Selection, TopicBeside, Warn};
 
 const TWO_SENSORS: &str = r#"{"id":"left","stamp":{"sec":1,"nsec":0},"gyro":[0.5,0,0]}
@@ -89,7 +89,7 @@ fn samples_come_in_the_body_axes_that_are_said_whatever_those_of_the_format() {
     let reading = TopicReading::new(&recording, None, &mut decoders).unwrap();
     let mut raw = Vec::new();
     let took = reading.walk(&pool, |taken| {
-        if let Taken::Sample(_, sample) = taken
+        if let TopicItem::Sample(_, sample) = taken
             && let Some(gyro) = sample.gyro
         {
             raw.push(gyro);

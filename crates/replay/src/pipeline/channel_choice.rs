@@ -4,7 +4,7 @@
 //! against which reference.
 
 use super::request::ReplayRequest;
-use super::session::Found;
+use super::session::TopicInfo;
 use crate::error::{Error, Result};
 use crate::sink::{Stream, output_topic};
 use std::collections::BTreeSet;
@@ -16,8 +16,8 @@ use strapd_attitude::setting::{FIELD, TOPIC};
 use strapd_recording::Recording;
 use strapd_recording::decode::Decoder;
 use strapd_recording::mcap::Channel;
-use strapd_recording::recording::beside::{self, Besides};
-use strapd_recording::recording::channel_route::{Noticed, Route, Taker};
+use strapd_recording::recording::beside::{self, AuxiliaryInputs};
+use strapd_recording::recording::channel_route::{Noticed, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::recording::sources::{Publisher, is_same};
@@ -25,8 +25,8 @@ use strapd_recording::recording::topic_plan::{self, TopicPlan};
 use strapd_recording::recording::topics;
 
 /// A topic that was chosen, and how it is read.
-pub(super) struct Chosen<'l> {
-    pub(super) found: Found,
+pub(super) struct RunTopic<'l> {
+    pub(super) found: TopicInfo,
     pub(super) stream: Stream,
     plan: TopicPlan<'l>,
 }
@@ -36,7 +36,7 @@ pub(super) fn choose<'l>(
     path: &Path,
     log: &'l Recording,
     names: &[String],
-) -> Result<Vec<Chosen<'l>>> {
+) -> Result<Vec<RunTopic<'l>>> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
     if run.copy_input {
         taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
@@ -59,7 +59,7 @@ pub(super) fn choose_each<'l>(
     log: &'l Recording,
     names: &[String],
     decoders: &mut Decoders,
-) -> Vec<Result<Chosen<'l>>> {
+) -> Vec<Result<RunTopic<'l>>> {
     let taken = BTreeSet::new();
     names
         .iter()
@@ -73,13 +73,13 @@ fn choose_one<'l>(
     name: &str,
     taken: &BTreeSet<String>,
     decoders: &mut Decoders,
-) -> Result<Chosen<'l>> {
+) -> Result<RunTopic<'l>> {
     let plan = TopicPlan::named(log, name, decoders)?;
     let (first, decoder) = plan.first_with_rate(path)?;
     let topic = output_topic(&plain_name(&plan.source), taken);
     let mut stream = Stream::new(name, &plan.frame());
     stream.output_topic = topic.clone();
-    let found = Found {
+    let found = TopicInfo {
         name: name.to_owned(),
         output_topic: topic,
         described: described(&first.channel),
@@ -92,7 +92,7 @@ fn choose_one<'l>(
             .chain(which_stamp(decoder).map(Into::into))
             .collect(),
     };
-    Ok(Chosen {
+    Ok(RunTopic {
         found,
         stream,
         plan,
@@ -107,8 +107,8 @@ pub(super) fn besides(
     run: &ReplayRequest,
     path: &Path,
     log: &Recording,
-    chosen: &mut [Chosen<'_>],
-) -> Result<Besides> {
+    chosen: &mut [RunTopic<'_>],
+) -> Result<AuxiliaryInputs> {
     let asked = run.selection.accel.as_ref().or(run.selection.mag.as_ref());
     let [one] = chosen else {
         if let Some(asked) = asked.filter(|_| !chosen.is_empty()) {
@@ -121,7 +121,7 @@ pub(super) fn besides(
                 .help(format!("{TOPIC} NAME takes one of them")),
             ));
         }
-        return Ok(Besides::default());
+        return Ok(AuxiliaryInputs::default());
     };
     let has_field = one.plan.channels.iter().any(|(_, d)| d.stated().has_mag);
     let own = (one.plan.source.topic.as_str(), has_field);
@@ -169,7 +169,7 @@ pub(super) struct Reference {
 
 impl Reference {
     /// Whether it lies on the very topic of the samples.
-    pub(super) fn is_of(&self, chosen: &Chosen<'_>) -> bool {
+    pub(super) fn is_of(&self, chosen: &RunTopic<'_>) -> bool {
         self.channel.topic == chosen.plan.source.topic
     }
 }
@@ -180,7 +180,7 @@ pub(super) fn reference(
     run: &ReplayRequest,
     path: &Path,
     log: &Recording,
-    chosen: &[Chosen<'_>],
+    chosen: &[RunTopic<'_>],
     apart: bool,
 ) -> Result<Option<Reference>> {
     let Some(asked) = &run.against else {
@@ -231,8 +231,8 @@ pub(super) fn reference(
 
 /// The way of a channel's messages to the streams, with what is noticed put aside.
 pub(super) fn looked_at(
-    chosen: &[Chosen<'_>],
-    besides: Option<&Besides>,
+    chosen: &[RunTopic<'_>],
+    besides: Option<&AuxiliaryInputs>,
     channel: &Channel,
 ) -> Option<Route> {
     let beside = besides.and_then(|besides| besides.decoder(channel).cloned());
@@ -246,21 +246,21 @@ pub(super) fn looked_at(
 }
 
 fn to_streams(
-    chosen: &[Chosen<'_>],
+    chosen: &[RunTopic<'_>],
     channel: &Channel,
-    noticed: impl Fn(&Chosen<'_>) -> Arc<Noticed>,
+    noticed: impl Fn(&RunTopic<'_>) -> Arc<Noticed>,
 ) -> Option<Route> {
     let plans = chosen.iter().map(|c| &c.plan);
-    topic_plan::route(plans, channel, |stream, _| Taker {
+    topic_plan::route(plans, channel, |stream, _| RouteTarget {
         stream,
         noticed: chosen.get(stream).map(&noticed).unwrap_or_default(),
     })
 }
 
 pub(super) fn route(
-    chosen: &[Chosen<'_>],
+    chosen: &[RunTopic<'_>],
     reference: Option<&Reference>,
-    besides: &Besides,
+    besides: &AuxiliaryInputs,
     copy_input: bool,
     channel: &Arc<Channel>,
 ) -> Option<Route> {

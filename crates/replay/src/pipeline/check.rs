@@ -8,7 +8,7 @@ use super::each::each;
 use super::inspection::look_as;
 use super::position::Position;
 use super::request::ReplayRequest;
-use super::summarise::Told;
+use super::summarise::TopicOutcome;
 use crate::error::Result;
 use crate::findings::no_topic;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
@@ -150,7 +150,7 @@ fn integrate(
     has_reference: bool,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
-) -> Result<Vec<Told>> {
+) -> Result<Vec<TopicOutcome>> {
     if topics.is_empty() {
         return Ok(Vec::new());
     }

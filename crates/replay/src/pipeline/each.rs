@@ -4,7 +4,7 @@
 //! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
 //! square of its size.
 
-use super::channel_choice::{Chosen, besides, choose_each, reference, route};
+use super::channel_choice::{RunTopic, besides, choose_each, reference, route};
 use super::check::Drawing;
 use super::delivery::{Delivery, Outlet};
 use super::history::History;
@@ -14,14 +14,14 @@ use super::request::ReplayRequest;
 use super::session::{Session, Topic};
 use super::session_builder::topic;
 use super::summarise;
-use super::summarise::Told;
+use super::summarise::TopicOutcome;
 use crate::error::{Error, Result};
 use crate::sink::{Provenance, Stream};
 use std::ops::ControlFlow;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
-use strapd_recording::recording::beside::Besides;
+use strapd_recording::recording::beside::AuxiliaryInputs;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::opened::AHEAD;
 
@@ -36,11 +36,11 @@ pub(super) fn each(
     drawing: Option<&Drawing<'_>>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
-) -> Result<Vec<Told>> {
+) -> Result<Vec<TopicOutcome>> {
     let path = log.name();
     let mut decoders = Decoders::of_run(&run.plan, &run.selection.decode);
-    let mut told: Vec<Option<Told>> = Vec::new();
-    let mut chosen: Vec<Chosen<'_>> = Vec::new();
+    let mut told: Vec<Option<TopicOutcome>> = Vec::new();
+    let mut chosen: Vec<RunTopic<'_>> = Vec::new();
     for found in choose_each(run, path, log, names, &mut decoders) {
         told.push(found.map_or_else(
             |refused| Some(Err(Diagnostic::from(&refused))),
@@ -63,7 +63,7 @@ pub(super) fn each(
         }
     };
 
-    let prepared = prepare(run, log, (&chosen, &Besides::default()), pool)?;
+    let prepared = prepare(run, log, (&chosen, &AuxiliaryInputs::default()), pool)?;
     let mut topics = Vec::new();
     let mut streams: Vec<Stream> = Vec::new();
     let mut kept = Vec::new();

@@ -18,7 +18,7 @@ use strapd_recording::decode::Options;
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::Vectors;
-use strapd_recording::recording::channel_route::{Item, Noticed, Taker};
+use strapd_recording::recording::channel_route::{Item, Noticed, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::recording::opened::AHEAD;
@@ -29,7 +29,7 @@ use strapd_recording::recording::topics::{MOST_TOPICS, PICKED_UNNAMED};
 
 /// Result of looking at a log.
 #[derive(Debug)]
-pub struct Looks {
+pub struct LogInspection {
     /// The topics of samples, in the order of the log.
     pub topics: Vec<Inspection>,
     /// Topics beyond [`MOST_TOPICS`], which were not looked at; the best are looked at first.
@@ -39,7 +39,7 @@ pub struct Looks {
 }
 
 /// A topic being looked at.
-struct Look {
+struct TopicInspector {
     topic: String,
     of: String,
     described: PayloadType,
@@ -90,7 +90,7 @@ impl Si {
     }
 }
 
-impl Look {
+impl TopicInspector {
     fn take(&mut self, raw: &RawSample) -> std::result::Result<(), Diagnostic> {
         if raw.is_beside {
             if self.beside.len() < FEW {
@@ -164,7 +164,12 @@ impl Look {
 ///
 /// # Errors
 /// The log cannot be read, or `named` not decoded.
-pub fn look(log: &Recording, named: Option<&str>, options: &Options, pool: &Pool) -> Result<Looks> {
+pub fn look(
+    log: &Recording,
+    named: Option<&str>,
+    options: &Options,
+    pool: &Pool,
+) -> Result<LogInspection> {
     look_as(log, named, (options, &Plan::default()), pool)
 }
 
@@ -177,12 +182,12 @@ pub(crate) fn look_as(
     named: Option<&str>,
     (options, plan): (&Options, &Plan),
     pool: &Pool,
-) -> Result<Looks> {
+) -> Result<LogInspection> {
     let path = log.name();
     let (wanted, left_out) = wanted(log, named);
     let unsupported = |what: Diagnostic| Error::unsupported(path, what);
     let mut decoders = Decoders::of_run(plan, options);
-    let (mut looks, mut plans): (Vec<Look>, Vec<TopicPlan<'_>>) = Default::default();
+    let (mut looks, mut plans): (Vec<TopicInspector>, Vec<TopicPlan<'_>>) = Default::default();
     for (source, is_named) in wanted {
         let is_likely = |known: &LogChannel| is_named || known.rank() >= PICKED_UNNAMED;
         let of_topic = TopicPlan::of(log, source.clone(), &mut decoders, is_likely);
@@ -203,7 +208,7 @@ pub(crate) fn look_as(
         AHEAD,
         pool,
         |channel| {
-            topic_plan::route(plans.iter(), channel, |stream, _| Taker {
+            topic_plan::route(plans.iter(), channel, |stream, _| RouteTarget {
                 stream,
                 noticed: noticed.get(stream).cloned().unwrap_or_default(),
             })
@@ -250,7 +255,7 @@ pub(crate) fn look_as(
     for topic in &mut topics {
         topic.is_likely = rank_of(topic) == best;
     }
-    Ok(Looks {
+    Ok(LogInspection {
         topics,
         left_out,
         survey,
@@ -292,10 +297,10 @@ fn wanted<'l>(
     )
 }
 
-fn begin(of_topic: &TopicPlan<'_>, plan: &Plan) -> Option<Look> {
+fn begin(of_topic: &TopicPlan<'_>, plan: &Plan) -> Option<TopicInspector> {
     let (known, decoder) = of_topic.channels.first()?;
     let resolved = Meaning::new(plan, &decoder.stated().declared);
-    Some(Look {
+    Some(TopicInspector {
         topic: of_topic.source.name.clone(),
         of: of_topic.source.topic.clone(),
         described: described(&known.channel),

@@ -4,7 +4,7 @@ use super::position::Position;
 use super::replay::integrated_again;
 use super::replay_start::StreamStart;
 use super::request::ReplayRequest;
-use super::session::Found;
+use super::session::TopicInfo;
 use super::summarise;
 use crate::error::Result;
 use crate::sink::{Flow, Stream, output_topic};
@@ -86,10 +86,10 @@ fn read_into(
     })
 }
 
-fn met(run: &ReplayRequest, sensor: Sensor) -> (Found, Stream) {
+fn met(run: &ReplayRequest, sensor: Sensor) -> (TopicInfo, Stream) {
     let doubt = sensor.doubt.filter(|_| run.plan.unit.is_none());
     let stream = Stream::new(&sensor.name, "");
-    let found = Found {
+    let found = TopicInfo {
         output_topic: output_topic(&sensor.name, &BTreeSet::new()),
         name: sensor.name,
         described: sensor.described,

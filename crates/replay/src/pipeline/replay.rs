@@ -1,9 +1,9 @@
 //! A recorded log -> attitude, end to end. I/O.
 //!
-//! A file is read twice: once as far as is needed to know clock, bias, initial attitude and lines
-//! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
+//! Of a file one walk goes as far as is needed to know clock, bias, initial attitude and lines through stamps, the next
+//! integrates. A stream is read once; its first samples wait until these are known.
 
-use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route};
+use super::channel_choice::{RunTopic, besides, choose, looked_at, reference, route};
 use super::position::Position;
 use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
@@ -24,7 +24,7 @@ use strapd_recording::Recording;
 use strapd_recording::Source;
 use strapd_recording::format::open;
 use strapd_recording::pool::Pool;
-use strapd_recording::recording::beside::Besides;
+use strapd_recording::recording::beside::AuxiliaryInputs;
 use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::incoming::{Incoming, incoming};
 use strapd_recording::recording::input::is_pipe;
@@ -189,7 +189,7 @@ pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
 pub(super) fn prepare(
     run: &ReplayRequest,
     log: &Recording,
-    (chosen, besides): (&[Chosen<'_>], &Besides),
+    (chosen, besides): (&[RunTopic<'_>], &AuxiliaryInputs),
     pool: &Pool,
 ) -> Result<Vec<Result<Prepared>>> {
     let mut preparations: Vec<Preparation> = chosen

@@ -3,7 +3,7 @@
 
 use super::position::Position;
 use super::request::{ReplayRequest, refused};
-use super::session::{Found, Session};
+use super::session::{Session, TopicInfo};
 use super::session_builder::begin;
 use crate::error::Result;
 use crate::sink::{Flow, Stream};
@@ -14,7 +14,11 @@ use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::topics;
 
 /// Preparation that decides how the samples of `found` begin, before it has seen any.
-pub(super) fn preparation(run: &ReplayRequest, found: &Found, patience: Patience) -> Preparation {
+pub(super) fn preparation(
+    run: &ReplayRequest,
+    found: &TopicInfo,
+    patience: Patience,
+) -> Preparation {
     let stamps = StampPass::new(&run.plan, &found.resolved, run.other_kinds());
     Preparation::new(&run.plan, &found.resolved, patience).with_stamps(stamps)
 }
@@ -25,7 +29,7 @@ pub(super) struct StreamStart<'r> {
     path: &'r Path,
     /// Decisions of a look that went before.
     prepared: Option<Prepared>,
-    gathering: Option<(Found, Stream, Preparation)>,
+    gathering: Option<(TopicInfo, Stream, Preparation)>,
     /// Items that wait for these decisions; `None` of a look, to which all comes again.
     held: Option<Vec<Item>>,
     session: Option<Session>,
@@ -57,7 +61,7 @@ impl<'r> StreamStart<'r> {
     }
 
     /// Takes note of the topic once it is known.
-    pub(super) fn meet(&mut self, found: Found, stream: Stream) -> Result<()> {
+    pub(super) fn meet(&mut self, found: TopicInfo, stream: Stream) -> Result<()> {
         if let Some(prepared) = self.prepared.take() {
             self.session = Some(self.session(found, stream, prepared)?);
             return Ok(());
@@ -107,7 +111,7 @@ impl<'r> StreamStart<'r> {
     }
 
     /// Decides from what was gathered.
-    fn decide(&mut self) -> Result<Option<(Found, Stream, Prepared)>> {
+    fn decide(&mut self) -> Result<Option<(TopicInfo, Stream, Prepared)>> {
         let Some((found, stream, preparation)) = self.gathering.take() else {
             return Ok(None);
         };
@@ -130,7 +134,7 @@ impl<'r> StreamStart<'r> {
         self.session.insert(session).consume(held.into_iter(), pool)
     }
 
-    fn session(&self, found: Found, stream: Stream, prepared: Prepared) -> Result<Session> {
+    fn session(&self, found: TopicInfo, stream: Stream, prepared: Prepared) -> Result<Session> {
         let decided = std::iter::once(((found, stream), prepared));
         begin(self.run, self.path, decided)
     }

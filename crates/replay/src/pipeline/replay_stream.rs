@@ -7,7 +7,7 @@ use super::channel_choice::which_stamp;
 use super::position::Position;
 use super::replay_start::StreamStart;
 use super::request::ReplayRequest;
-use super::session::Found;
+use super::session::TopicInfo;
 use super::summarise;
 use crate::error::{Error, Result};
 use crate::finding::{Finding, Severity};
@@ -25,7 +25,7 @@ use strapd_recording::decode::{Decoder, Wanted};
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside;
-use strapd_recording::recording::channel_route::{Item, Noticed, Route, Taker};
+use strapd_recording::recording::channel_route::{Item, Noticed, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::held::Held;
 use strapd_recording::recording::log_channel::{LogChannel, described, known, rank};
@@ -43,9 +43,9 @@ pub(super) fn replay(
     let path = run.source.name();
     let mut start = StreamStart::new(run, &path, None);
     let mut failure = None;
-    let picked = std::cell::RefCell::new(Picked {
+    let picked = std::cell::RefCell::new(StreamTopic {
         decoders: Decoders::of_run(&run.plan, &run.selection.decode),
-        ..Picked::default()
+        ..StreamTopic::default()
     });
     let report = mcap::walk(
         reader,
@@ -99,13 +99,13 @@ pub(super) fn replay(
 
 /// The first IMU of a stream.
 #[derive(Default)]
-struct Picked {
+struct StreamTopic {
     topic: Option<String>,
     publisher: String,
     noticed: Arc<Noticed>,
     /// Channels of the topic so far.
     channels: usize,
-    found: Option<(Found, Stream)>,
+    found: Option<(TopicInfo, Stream)>,
     /// Whether there is or was such a find.
     is_met: bool,
     /// Channels of the topic whose first messages tell how to read them.
@@ -119,7 +119,7 @@ struct Picked {
     plain: Decoders,
 }
 
-impl Picked {
+impl StreamTopic {
     fn route(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Route> {
         let copied = run.copy_input.then(|| channel.clone());
         let beside = self.beside(run, channel);
@@ -152,7 +152,7 @@ impl Picked {
                     self.topic = Some(channel.topic.clone());
                     self.publisher = publisher(channel);
                 }
-                let taker = Taker {
+                let taker = RouteTarget {
                     stream: 0,
                     noticed: self.noticed.clone(),
                 };
@@ -217,7 +217,7 @@ impl Picked {
             return;
         }
         self.found = Some((
-            Found {
+            TopicInfo {
                 name: channel.topic.clone(),
                 output_topic: output_topic(&channel.topic, &BTreeSet::new()),
                 described: described(channel),

@@ -5,7 +5,7 @@
 
 use super::replay_start::preparation;
 use super::request::ReplayRequest;
-use super::session::{Found, Topic};
+use super::session::{Topic, TopicInfo};
 use super::summarise;
 use crate::error::Error;
 use crate::findings::of_sensor;
@@ -60,7 +60,7 @@ pub fn estimate<E>(
         plan: plan.clone(),
         ..ReplayRequest::new(Source::File(PathBuf::from(path)))
     };
-    let found = Found {
+    let found = TopicInfo {
         name: NAME.to_owned(),
         output_topic: String::new(),
         described: PayloadType::of_memory(DESCRIBED),

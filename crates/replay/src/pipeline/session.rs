@@ -42,8 +42,8 @@ pub(super) struct Topic {
     pub warnings: Vec<Diagnostic>,
     /// Estimator.
     pub estimator: Estimator,
-    /// Output of the estimator.
-    pub output: Output,
+    /// Figures of its attitudes.
+    pub output: AttitudeStats,
     /// Samples without any rate amid others.
     pub zeros: LoneZeros,
     /// The stamp of the last sample, used or not.
@@ -80,9 +80,9 @@ impl LoneZeros {
     }
 }
 
-/// Output of an estimator.
+/// Figures of the attitudes of an estimator.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Output {
+pub(super) struct AttitudeStats {
     /// First attitude.
     pub first: Option<AttitudeSample>,
     /// Last attitude.
@@ -95,7 +95,7 @@ pub(super) struct Output {
     steps: Histogram,
 }
 
-impl Output {
+impl AttitudeStats {
     pub(super) fn add(&mut self, samples: &[AttitudeSample]) {
         if self.first.is_none() {
             self.first = samples.first().copied();
@@ -119,7 +119,7 @@ impl Output {
     }
 }
 
-impl Output {
+impl AttitudeStats {
     /// The median rate, Hz; `None` below two attitudes.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         let step = self.steps.quantile(0.5);
@@ -135,7 +135,7 @@ impl Topic {
     pub(super) fn new(
         path: &Path,
         plan: &Plan,
-        found: Found,
+        found: TopicInfo,
         prepared: Prepared,
         against: bool,
     ) -> Result<Topic> {
@@ -164,7 +164,7 @@ impl Topic {
             noticed: found.noticed,
             warnings,
             estimator,
-            output: Output::default(),
+            output: AttitudeStats::default(),
             zeros: LoneZeros::default(),
             last_stamp: None,
             field,
@@ -218,7 +218,7 @@ impl Topic {
 
 /// Facts about a topic before its first sample.
 #[derive(Clone, Debug)]
-pub(super) struct Found {
+pub(super) struct TopicInfo {
     /// Name.
     pub name: String,
     /// Topic of its attitude.
@@ -399,7 +399,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Outlet::write`] and [`Outlet::finish`]; something was asked for that could not be done.
-    pub(super) fn finish(mut self, run: &ReplayRequest, pool: &Pool) -> Result<Ended> {
+    pub(super) fn finish(mut self, run: &ReplayRequest, pool: &Pool) -> Result<FinishedRun> {
         self.finish_topics(pool)?;
         // Whoever had enough has seen no end.
         if !self.closed {
@@ -412,7 +412,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Outlet::write`] and [`Outlet::finish`].
-    pub(super) fn finish_each(mut self, pool: &Pool) -> Result<Ended> {
+    pub(super) fn finish_each(mut self, pool: &Pool) -> Result<FinishedRun> {
         self.finish_topics(pool)?;
         self.complete()
     }
@@ -430,8 +430,8 @@ impl Session {
         })
     }
 
-    fn complete(self) -> Result<Ended> {
-        Ok(Ended {
+    fn complete(self) -> Result<FinishedRun> {
+        Ok(FinishedRun {
             topics: self.topics,
             outputs: self.outlet.finish()?,
         })
@@ -481,7 +481,7 @@ impl Session {
 
 /// A run that is over.
 #[derive(Debug)]
-pub(super) struct Ended {
+pub(super) struct FinishedRun {
     /// Topics.
     pub topics: Vec<Topic>,
     /// Outputs by name.

@@ -6,7 +6,7 @@ use super::delivery::{Delivery, Outlet};
 use super::provenance;
 use super::recorded::RecordedTrack;
 use super::request::ReplayRequest;
-use super::session::{Found, Session, Topic};
+use super::session::{Session, Topic, TopicInfo};
 use crate::error::Result;
 use crate::sink::Stream;
 use std::path::Path;
@@ -41,7 +41,7 @@ pub fn labelled(
 pub(super) fn topic(
     run: &ReplayRequest,
     path: &Path,
-    (found, stream): (Found, Stream),
+    (found, stream): (TopicInfo, Stream),
     prepared: Prepared,
 ) -> Result<(Topic, Stream)> {
     let stream = labelled(stream, &run.plan, &found.resolved, &prepared);
@@ -56,7 +56,7 @@ pub(super) fn topic(
 pub(super) fn begin(
     run: &ReplayRequest,
     path: &Path,
-    decided: impl Iterator<Item = ((Found, Stream), Prepared)>,
+    decided: impl Iterator<Item = ((TopicInfo, Stream), Prepared)>,
 ) -> Result<Session> {
     let topics = decided.map(|(start, prepared)| topic(run, path, start, prepared));
     let topics = topics.collect::<Result<Vec<_>>>()?;

@@ -3,7 +3,7 @@
 use super::delivery::broken;
 use super::request::ReplayRequest;
 use super::sample_kinds::AgainstRecorded;
-use super::session::{Ended, Topic};
+use super::session::{FinishedRun, Topic};
 use super::unmet::{FieldWatch, unmet};
 use crate::findings;
 use crate::summary::calibration;
@@ -19,8 +19,8 @@ use strapd_recording::mcap::Survey;
 
 /// The summary of a run.
 #[must_use]
-pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSummary {
-    let Ended {
+pub(super) fn run(run: &ReplayRequest, ended: FinishedRun, survey: &Survey) -> RunSummary {
+    let FinishedRun {
         mut topics,
         outputs,
     } = ended;
@@ -49,10 +49,10 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
 }
 
 /// Summary of a topic, or the reason why there is none.
-pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
+pub(super) type TopicOutcome = std::result::Result<Box<TopicSummary>, Diagnostic>;
 
 /// Summaries of the topics of a run without outputs, or why one has not what was asked for.
-pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<Told> {
+pub(super) fn topics(run: &ReplayRequest, ended: FinishedRun) -> Vec<TopicOutcome> {
     let told = |mut topic: Topic| match unmet(&run.plan, &topic) {
         Some(what) => Err(what),
         None => Ok(Box::new(of_topic(run, &mut topic))),

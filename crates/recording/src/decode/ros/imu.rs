@@ -70,7 +70,9 @@ pub(crate) fn ros1(
 pub(crate) fn orientation_covariance(payload: &[u8], is_cdr: bool) -> Option<[f64; 9]> {
     fn of<const BIG: bool>(data: &[u8], head: usize, align: usize) -> Option<[f64; 9]> {
         let body = Body::<BIG>::of(data, head, align)?;
-        Some(std::array::from_fn(|n| body.double(imu::ORIENTATION_COVARIANCE + n)))
+        Some(std::array::from_fn(|n| {
+            body.double(imu::ORIENTATION_COVARIANCE + n)
+        }))
     }
     match payload.split_first_chunk::<4>() {
         Some(([0, 1, ..], data)) if is_cdr => of::<false>(data, 0, 8),
@@ -205,7 +207,7 @@ mod tests {
             if cdr {
                 payload.resize((payload.len() - 4).next_multiple_of(8) + 4, 0);
             }
-            for v in body {
+            for v in &body {
                 payload.extend(if big && cdr { v.to_be_bytes() } else { v.to_le_bytes() });
             }
             payload.resize((payload.len() as i32 + extra) as usize, 0);
@@ -217,6 +219,10 @@ mod tests {
                 format!("{outcome:?} {out:?}")
             });
             prop_assert_eq!(&read[0], &read[1]);
+            let covariance = orientation_covariance(&payload, cdr);
+            let bits = covariance.map(|rows| rows.map(f64::to_bits).to_vec());
+            let is_whole = (0..=crate::decode::ros::MAX_PADDING as i32).contains(&extra);
+            prop_assert_eq!(bits, is_whole.then(|| body[4..13].to_vec()));
         }
     }
 
