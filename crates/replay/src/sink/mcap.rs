@@ -192,7 +192,7 @@ impl Layout {
         let mut declare = |topic: &str, schema: [&str; 3]| {
             let [name, form, text] = schema;
             file.schema(out, name, form, text.as_bytes())
-                .and_then(|id| file.channel(out, id, topic, encoding.name(), metadata.clone()))
+                .and_then(|id| file.channel(out, id, topic, encoding.name(), &metadata))
                 .ok_or_else(too_many_channels)
         };
         let (attitude_schema, transform_schema) = match encoding {
@@ -447,7 +447,7 @@ pub(super) fn declare_copy(
         schema,
         channel.topic,
         channel.message_encoding,
-        channel.metadata.clone(),
+        channel.metadata,
     )
     .ok_or_else(too_many_channels)
 }

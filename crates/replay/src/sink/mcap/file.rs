@@ -5,6 +5,7 @@
 
 use super::chunk::{Chunk, Compression};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use strapd_recording::mcap::{
     AttachmentIndex, AttachmentRecord, Carried, ChannelRecord, ChunkIndex, DataEnd, Footer, HEAD,
     HeaderRecord, MAGIC, MetadataIndex, MetadataRecord, SchemaRecord, Statistics, SummaryOffset,
@@ -26,51 +27,6 @@ pub struct Attachment<'a> {
     pub data: &'a [u8],
 }
 
-/// Fields of a channel, kept for the summary.
-#[derive(Clone, Debug)]
-struct Channel {
-    id: u16,
-    /// 0: none.
-    schema: u16,
-    topic: String,
-    encoding: String,
-    metadata: BTreeMap<String, String>,
-}
-
-impl Channel {
-    fn push(&self, out: &mut Vec<u8>) {
-        let record = ChannelRecord {
-            id: self.id,
-            schema_id: self.schema,
-            topic: &self.topic,
-            message_encoding: &self.encoding,
-            metadata: pairs(&self.metadata),
-        };
-        record.push(out);
-    }
-}
-
-/// Fields of a schema, likewise.
-#[derive(Clone, Debug)]
-struct Schema {
-    id: u16,
-    name: String,
-    encoding: String,
-    text: Vec<u8>,
-}
-
-impl Schema {
-    fn push(&self, out: &mut Vec<u8>) {
-        let record = SchemaRecord {
-            id: self.id,
-            name: &self.name,
-            encoding: &self.encoding,
-            data: &self.text,
-        };
-        record.push(out);
-    }
-}
-
 fn pairs(map: &BTreeMap<String, String>) -> Vec<(&str, &str)> {
     map.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect()
 }
@@ -80,10 +36,15 @@ fn pairs(map: &BTreeMap<String, String>) -> Vec<(&str, &str)> {
 pub(in crate::sink) struct McapFile {
     offset: u64,
     crc: crc32fast::Hasher,
-    schemas: Vec<Schema>,
-    /// Places in `schemas` by CRC-32 and length of the text: a log may have thousands, and each is asked for.
-    schemas_by_text: BTreeMap<(u32, usize), Vec<usize>>,
-    channels: Vec<Channel>,
+    /// Schema records as they are in the file: the summary has them again.
+    schemas: Vec<u8>,
+    schema_count: u16,
+    /// Ids of schemas and the places of their fields behind it, by the CRC-32 of these: a log may have thousands, and
+    /// each is asked for.
+    schemas_by_fields: BTreeMap<u32, Vec<(u16, Range<usize>)>>,
+    /// Channel records, likewise.
+    channels: Vec<u8>,
+    channel_count: u16,
     messages: BTreeMap<u16, u64>,
     times: Option<(u64, u64)>,
     chunks: u32,
@@ -179,26 +140,29 @@ impl McapFile {
         encoding: &str,
         text: &[u8],
     ) -> Option<u16> {
-        let key = (crc32fast::hash(text), text.len());
-        let alike = self.schemas_by_text.entry(key).or_default();
-        if let Some(known) = alike
-            .iter()
-            .filter_map(|at| self.schemas.get(*at))
-            .find(|s| s.name == name && s.encoding == encoding && s.text == text)
-        {
-            return Some(known.id);
-        }
         // Zero means "no schema".
-        let id = u16::try_from(self.schemas.len() + 1).ok()?;
-        let schema = Schema {
+        let id = self.schema_count.saturating_add(1);
+        let start = self.schemas.len();
+        let record = SchemaRecord {
             id,
-            name: name.to_owned(),
-            encoding: encoding.to_owned(),
-            text: text.to_vec(),
+            name,
+            encoding,
+            data: text,
         };
-        schema.push(out);
-        alike.push(self.schemas.len());
-        self.schemas.push(schema);
+        record.push(&mut self.schemas);
+        let fields = start + HEAD + size_of_val(&id)..self.schemas.len();
+        let fields_of = |at: &Range<usize>| self.schemas.get(at.clone());
+        let own = fields_of(&fields)?;
+        let alike = self.schemas_by_fields.entry(crc32fast::hash(own));
+        let alike = alike.or_default();
+        let known = alike.iter().find(|(_, at)| fields_of(at) == Some(own));
+        if known.is_some() || id == self.schema_count {
+            self.schemas.truncate(start);
+            return known.map(|(id, _)| *id);
+        }
+        alike.push((id, fields));
+        out.extend_from_slice(&self.schemas[start..]);
+        self.schema_count = id;
         Some(id)
     }
 
@@ -209,18 +173,20 @@ impl McapFile {
         schema: u16,
         topic: &str,
         encoding: &str,
-        metadata: BTreeMap<String, String>,
+        metadata: &BTreeMap<String, String>,
     ) -> Option<u16> {
-        let id = u16::try_from(self.channels.len() + 1).ok()?;
-        let channel = Channel {
+        let id = self.channel_count.checked_add(1)?;
+        let start = self.channels.len();
+        let record = ChannelRecord {
             id,
-            schema,
-            topic: topic.to_owned(),
-            encoding: encoding.to_owned(),
-            metadata,
+            schema_id: schema,
+            topic,
+            message_encoding: encoding,
+            metadata: pairs(metadata),
         };
-        channel.push(out);
-        self.channels.push(channel);
+        record.push(&mut self.channels);
+        out.extend_from_slice(&self.channels[start..]);
+        self.channel_count = id;
         Some(id)
     }
 
@@ -269,10 +235,10 @@ impl McapFile {
             }
         };
         group(&mut out, op::SCHEMA, &|out| {
-            self.schemas.iter().for_each(|s| s.push(out));
+            out.extend_from_slice(&self.schemas);
         });
         group(&mut out, op::CHANNEL, &|out| {
-            self.channels.iter().for_each(|c| c.push(out));
+            out.extend_from_slice(&self.channels);
         });
         group(&mut out, op::STATISTICS, &|out| self.push_statistics(out));
         group(&mut out, op::CHUNK_INDEX, &|out| {
@@ -329,8 +295,8 @@ impl McapFile {
         let (start, end) = self.times.unwrap_or_default();
         let statistics = Statistics {
             message_count: self.messages(),
-            schema_count: self.schemas.len() as u16,
-            channel_count: self.channels.len() as u32,
+            schema_count: self.schema_count,
+            channel_count: self.channel_count.into(),
             attachment_count: self.attachments,
             metadata_count: self.metadata,
             chunk_count: self.chunks,

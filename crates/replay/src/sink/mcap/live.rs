@@ -82,7 +82,7 @@ impl LiveMcap {
                 let mut metadata = self.metadata.clone();
                 metadata.extend(more.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())));
                 self.file
-                    .channel(out, id, topic, Encoding::Cdr.name(), metadata)
+                    .channel(out, id, topic, Encoding::Cdr.name(), &metadata)
             })
             .ok_or_else(too_many_channels)
     }
