@@ -27,6 +27,7 @@ pub mod report;
 pub mod send;
 pub mod serve;
 pub mod serving;
+pub mod setting_args;
 pub mod shell;
 pub mod simulate;
 pub mod tables;

@@ -10,7 +10,6 @@ use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::time::{Duration, Instant};
-use strapd_attitude::estimate::Aid;
 use strapd_replay::pipeline::samples::{Stop, estimate as run};
 use strapd_replay::summary::TopicSummary;
 
@@ -67,7 +66,7 @@ pub fn estimate<'py>(
     dt: Option<Times<'py>>,
     settings: &Bound<'py, PyDict>,
 ) -> PyResult<(Bound<'py, PyDict>, Outcome<'py>)> {
-    let plan = settings::plan(settings, Aid::Auto)?;
+    let plan = settings::plan(settings)?;
     let samples = Samples::new(
         &gyr,
         &t,

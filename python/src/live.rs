@@ -10,7 +10,7 @@ use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Estimator, Meaning, Plan, Prepared, at_once};
+use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, at_once};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, Nanos, RawSample};
 use strapd_replay::pipeline::samples::so_far;
@@ -118,7 +118,7 @@ impl Live {
         {
             return Err(argument(format!("rate_hz: {rate} is no sample rate")));
         }
-        let plan = settings::plan(settings, Aid::Auto)?;
+        let plan = settings::plan(settings)?;
         if plan.smooth {
             return Err(argument(
                 Diagnostic::new("smooth: only a whole recording can be smoothed")

@@ -4,7 +4,7 @@ mod gather;
 mod outputs;
 mod words;
 
-use super::estimation::{KindArg, TimeArg, UnitArg};
+use super::setting_args::{Given, Reading};
 use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::config::selection;
@@ -15,7 +15,6 @@ use crate::sink::Document;
 use clap::Args;
 use gather::Gathered;
 use std::path::PathBuf;
-use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
@@ -24,10 +23,13 @@ use strapd_recording::Input;
 use strapd_recording::Selection;
 use strapd_recording::pool::Pool;
 
+/// Help of the longest gap, which is filled here.
+const MAX_GAP_HELP: &str = "Longest run of missing samples that is filled with a straight line, in seconds; at longer ones the record is split";
+
 /// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
 /// quantisation, ramp
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:
+#[command(mut_arg("max_gap", |gap| gap.help(MAX_GAP_HELP).long_help(None::<&str>)), after_help = "Examples:
   strapd allan rest.mcap                          a table, and the --noise flags for it
   strapd allan rest.mcap --plot allan.svg         the three axes and what was fitted
   strapd allan rest.mcap --start 600 --json       after ten minutes of warming up
@@ -49,33 +51,9 @@ pub struct Allan {
     /// Use a gyro whose covariance is marked -1 (absent) all the same
     #[arg(long)]
     pub ignore_covariance_flag: bool,
-    /// Clock on which the samples are placed; `index` needs --rate-hz
-    #[arg(long, value_enum, default_value = "header", env = "STRAPD_TIME")]
-    pub time: TimeArg,
-    /// Sample rate for --time index
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
-    pub rate_hz: Option<f64>,
-    /// Meaning of a sample in time [default: rate, unless the format says otherwise]
-    #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
-    pub sample_kind: Option<KindArg>,
-    /// Unit of the recorded rates [default: rad, unless the format says otherwise]
-    #[arg(long, value_enum, env = "STRAPD_GYRO_UNIT")]
-    pub gyro_unit: Option<UnitArg>,
-    /// Longest run of missing samples that is filled with a straight line, in seconds; at longer
-    /// ones the record is split
-    #[arg(
-        long,
-        value_name = "SECS",
-        default_value_t = 0.5,
-        allow_negative_numbers = true
-    )]
-    pub max_gap: f64,
-    /// Skip the first seconds of the data
-    #[arg(long, value_name = "SECS", allow_negative_numbers = true)]
-    pub start: Option<f64>,
-    /// Stop after this many seconds of the data
-    #[arg(long, value_name = "SECS", allow_negative_numbers = true)]
-    pub until: Option<f64>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub settings: Given<Reading>,
     /// Write the curves and the fits as a chart
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
@@ -223,33 +201,8 @@ fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, Diagnostic> {
 impl Allan {
     /// The flags as a plan: what replay's of the same names mean.
     fn plan(&self) -> Result<Plan> {
-        let clock = match (self.time, self.rate_hz) {
-            (TimeArg::Index, Some(rate_hz)) => Clock::Index { rate_hz },
-            (TimeArg::Index, None) => {
-                return Err(Error::usage(
-                    Diagnostic::new("--time index: the sample rate is needed too")
-                        .help("--rate-hz HZ"),
-                ));
-            }
-            (_, Some(_)) => {
-                return Err(Error::usage(
-                    Diagnostic::new("--rate-hz: only --time index uses it")
-                        .help("--time index --rate-hz HZ"),
-                ));
-            }
-            (TimeArg::Header, None) => Clock::Header,
-            (TimeArg::Log, None) => Clock::Log,
-            (TimeArg::Publish, None) => Clock::Publish,
-        };
-        let plan = Plan {
-            kind: self.sample_kind.map(SampleKind::from),
-            unit: self.gyro_unit.map(GyroUnit::from),
-            clock,
-            max_gap_secs: self.max_gap,
-            start: self.start,
-            until: self.until,
-            ..Plan::default()
-        };
+        let mut plan = Plan::default();
+        self.settings.put(&mut plan, None).map_err(Error::usage)?;
         plan.check().map_err(Error::usage)?;
         Ok(plan)
     }

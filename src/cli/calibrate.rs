@@ -1,7 +1,7 @@
 //! `strapd calibrate LOG... -o FILE.toml`: recordings of one sensor -> its calibration. I/O.
 
 use super::calibration_files::{check_target, write};
-use super::estimation::{AidArg, Estimation};
+use super::estimation::Estimation;
 use super::outputs::shown;
 use super::progress::Reporter;
 use super::tables::Tables;
@@ -136,7 +136,7 @@ impl Calibrate {
                 ));
             }
         }
-        if self.estimation.aid == AidArg::None {
+        if self.estimation.is_unaided() {
             return Err(Error::usage(
                 Diagnostic::new(
                     "calibrate: --aid none: the gyro alone tells nothing of its errors",

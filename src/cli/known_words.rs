@@ -3,10 +3,11 @@
 //! A stage of its own because clap knows either a list that is everything, or no list at all: a flag that takes `gravity` and
 //! `q=1,0,0,0` could not be completed by a shell.
 
-use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use super::setting_args;
+use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use std::ffi::OsStr;
-use strapd_attitude::estimate::NOISE_PRESETS;
 use strapd_attitude::noise::sensor_error::PRESETS;
+use strapd_attitude::setting::SAMPLE_KIND;
 use strapd_bodies::top::Case;
 use strapd_bodies::top::method_errors::case;
 
@@ -42,34 +43,14 @@ fn text(words: impl IntoIterator<Item = &'static str>) -> Known<StringValueParse
     }
 }
 
-/// `--init`: its words, and how the others begin.
-pub(super) fn initial() -> Known<StringValueParser> {
-    text(["identity", "gravity", "first-orientation", "q=", "rpy="])
-}
-
-/// `--bias`.
-pub(super) fn bias() -> Known<StringValueParser> {
-    text(["none", "auto"])
-}
-
-/// `--body`.
-pub(super) fn body() -> Known<StringValueParser> {
-    text(["flu", "frd"])
-}
-
-/// `--undo-truncation`.
-pub(super) fn truncation() -> Known<StringValueParser> {
-    text(["auto", "on", "off"])
+/// Words of `--sample-kind`, as of what estimates.
+pub(super) fn sample_kind() -> PossibleValuesParser {
+    setting_args::words(SAMPLE_KIND)
 }
 
 /// `--speed`.
 pub(super) fn speed() -> Known<StringValueParser> {
     text(["max", "1"])
-}
-
-/// `--noise` of what estimates: classes of sensors.
-pub(super) fn noise_class() -> Known<StringValueParser> {
-    text(NOISE_PRESETS.iter().map(|class| class.name))
 }
 
 /// `--noise` of what simulates: sensors.

@@ -2,11 +2,12 @@
 
 use super::calibration_files;
 use super::continued;
-use super::estimation::{AidArg, Estimation};
+use super::estimation::Estimation;
 use super::known_words;
 use super::own_output;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
+use super::setting_args::{Given, Smoothing};
 use super::tables::Tables;
 use super::{Global, Outcome, outputs, print};
 use crate::config::Shard;
@@ -20,6 +21,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
+use strapd_attitude::setting::{BIAS, SMOOTH};
 use strapd_recording::Selection;
 use strapd_recording::Source;
 use strapd_recording::pool::Pool;
@@ -43,10 +45,9 @@ pub struct Replay {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
-    /// Smooth: the best attitude the whole recording can give, all of it at the end, with the sensor calibrated from
-    /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
-    #[arg(long, help_heading = "Estimation")]
-    pub smooth: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub smoothing: Given<Smoothing>,
     /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
@@ -194,7 +195,9 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
     }
     outputs::check_distinct(&args.outputs, recordings)?;
     args.check_calibrations(&logs)?;
-    let plan = args.estimation.plan_of_a_recording(args.smooth)?;
+    let plan = args
+        .estimation
+        .plan_of_a_recording(args.smoothing.is(SMOOTH, "true"))?;
     let mut selection = args.estimation.selection()?;
     args.tables.put(&mut selection.decode)?;
     let pool = Pool::new(global.threads)?;
@@ -285,7 +288,7 @@ impl Replay {
         if self.estimation.topic.as_deref() == Some("all") {
             return wrong("a calibration is of one sensor", "--topic NAME");
         }
-        if self.estimation.aid == AidArg::None && self.estimation.bias.as_deref() != Some("auto") {
+        if self.estimation.is_unaided() && !self.estimation.settings.is(BIAS, "auto") {
             return wrong(
                 "the gyro alone learns nothing",
                 "--aid gravity, or --bias auto for the bias of a rest",

@@ -2,6 +2,7 @@
 
 use super::estimation::Estimation;
 use super::progress::Reporter;
+use super::setting_args::{Given, Smoothing};
 use super::tables::Tables;
 use super::{Global, Outcome, allan, own_output, print, with_each};
 use crate::error::{Error, Result};
@@ -16,6 +17,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
+use strapd_attitude::setting::SMOOTH;
 use strapd_recording::Input;
 use strapd_recording::Selection;
 use strapd_recording::decode::Options;
@@ -46,10 +48,9 @@ pub struct Report {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
-    /// Smooth: the best attitude the whole recording can give, all of it at the end, with the sensor calibrated from
-    /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
-    #[arg(long, help_heading = "Estimation")]
-    pub smooth: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub smoothing: Given<Smoothing>,
     /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
@@ -96,7 +97,9 @@ pub fn run(global: &Global, mut args: Report) -> Result<Outcome> {
             "one log, or --ref-topic NAME for a reference in each of them",
         )));
     }
-    let plan = args.estimation.plan_of_a_recording(args.smooth)?;
+    let plan = args
+        .estimation
+        .plan_of_a_recording(args.smoothing.is(SMOOTH, "true"))?;
     let mut selection = args.estimation.selection()?;
     args.tables.put(&mut selection.decode)?;
     let inputs: Vec<PathBuf> = args.files.iter().chain(&args.reference).cloned().collect();

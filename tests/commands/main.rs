@@ -37,6 +37,7 @@ mod regularise;
 mod replay;
 mod report;
 mod rosbag2;
+mod settings;
 mod simulate;
 mod sinks;
 mod smoothing;

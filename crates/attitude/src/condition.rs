@@ -54,6 +54,7 @@ pub use clock::{Clock, ClockWarning, choose_clock};
 pub use histogram::Histogram;
 pub use memory::Memory;
 pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
+pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};
 pub use settings::{OnGap, Settings, SettingsError};
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};

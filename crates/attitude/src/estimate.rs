@@ -4,6 +4,7 @@
 //! found in the samples themselves, and because replay, serve and a library user are to get the same bits.
 //!
 //! ```text
+//! what a person gives -> settings -> Plan
 //! Plan, Declared -> Meaning
 //! first samples, or all of them -> Preparation -> Prepared
 //! samples, Meaning, Prepared -> Estimator -> AttitudeSample
@@ -23,6 +24,7 @@ mod plan;
 mod pooled;
 mod preparation;
 mod sensor_calibration;
+pub mod settings;
 mod settings_number;
 mod smoothing;
 mod stamps;

@@ -282,10 +282,11 @@ impl fmt::Display for NotARotation {
 
 impl std::error::Error for NotARotation {}
 
-/// Outside text, fit for a message: short, and without control characters.
-pub(crate) fn quoted(text: &str) -> String {
-    let mut quoted: String = text.chars().take(16).flat_map(char::escape_debug).collect();
-    if text.chars().nth(16).is_some() {
+/// Outside text, fit for a message: of at most so many characters, and without control characters.
+pub(crate) fn quoted(text: &str, most: usize) -> String {
+    let shown = text.chars().take(most);
+    let mut quoted: String = shown.flat_map(char::escape_debug).collect();
+    if text.chars().nth(most).is_some() {
         quoted.push_str("...");
     }
     quoted

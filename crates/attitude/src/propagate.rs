@@ -48,7 +48,7 @@ mod window;
 
 pub use covariance::Noise;
 pub use executor::{Executor, Sequential};
-pub use method::{LARGEST_WINDOW, Method, Order, Placement, UnknownName};
+pub use method::{LARGEST_WINDOW, Method, Order, Placement};
 pub use propagator::{Memory, Propagator};
 pub use report::Report;
 pub use settings::{Settings, SettingsError};

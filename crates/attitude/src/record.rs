@@ -76,7 +76,7 @@ pub enum SampleKind {
 impl SampleKind {
     /// The name used by `--sample-kind` and in every summary.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             SampleKind::Rate => "rate",
             SampleKind::Average => "average",

@@ -21,13 +21,22 @@ use std::sync::OnceLock;
 
 /// Something that can be set for a run, whoever sets it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
-pub struct Setting(&'static str);
+pub struct Setting {
+    name: &'static str,
+    key: &'static str,
+}
 
 impl Setting {
     /// Name as that of a field: `gyro_unit`.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        self.0
+        self.name
+    }
+
+    /// The same name in a file or on a command line: `gyro-unit`.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        self.key
     }
 
     /// Returns it with a value, as advice: `GYRO_UNIT.to("deg")`.
@@ -53,8 +62,8 @@ impl From<Setting> for Choice {
 impl fmt::Display for Setting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match NAMING.get() {
-            Some(write) => write(self.0, f),
-            None => f.write_str(self.0),
+            Some(write) => write(self.name, f),
+            None => f.write_str(self.name),
         }
     }
 }
@@ -104,60 +113,82 @@ pub fn name_settings(naming: Naming) -> Result<(), AlreadyNamed> {
     NAMING.set(naming).map_err(|_| AlreadyNamed)
 }
 
+/// A name with `-` for `_`, as bytes, which a constant can have.
+const fn dashed<const N: usize>(name: &str) -> [u8; N] {
+    let (mut key, mut n) = ([b'-'; N], 0);
+    while n < N {
+        if name.as_bytes()[n] != b'_' {
+            key[n] = name.as_bytes()[n];
+        }
+        n += 1;
+    }
+    key
+}
+
 macro_rules! settings {
-    ($($name:ident = $field:literal: $what:literal;)*) => {
-        $(#[doc = $what] pub const $name: Setting = Setting($field);)*
+    ($($name:ident = $field:literal;)*) => {
+        $(#[doc = concat!("Setting `", $field, "`.")]
+        pub const $name: Setting = {
+            const KEY: [u8; $field.len()] = dashed($field);
+            match std::str::from_utf8(&KEY) {
+                Ok(key) => Setting { name: $field, key },
+                Err(_) => panic!("a name is ASCII"),
+            }
+        };)*
 
         /// All of them.
         pub const ALL: &[Setting] = &[$($name),*];
     };
 }
 
+// What one of an estimation means, stands in its row (`estimate/settings/rows.rs`); of the others, in the command's help.
 settings! {
-    ACCEL_TOPIC = "accel_topic": "The topic of the specific force, where it has one of its own.";
-    AGAINST_RECORDED = "against_recorded": "Hold the result against an orientation in the recording.";
-    AID = "aid": "What corrects the attitude.";
-    BIAS = "bias": "The gyro's bias.";
-    BODY = "body": "Axes of the recorded body.";
-    CALIBRATION = "calibration": "What is known of the sensor.";
-    COLUMNS = "columns": "What the columns of a table are.";
-    COPY_INPUT = "copy_input": "Copy the recording to the output.";
-    DECLINATION = "declination": "Magnetic north from true north.";
-    DELIMITER = "delimiter": "What stands between the cells of a table.";
-    EARTH_RATE = "earth_rate": "The latitude whose share of the Earth's rotation is taken out.";
-    ENCODING = "encoding": "How messages of an output are encoded.";
-    FIELD = "field": "Where a quantity lies in a message.";
-    FORCE = "force": "Replace an output that exists.";
-    GYRO_RANGE = "gyro_range": "Where the gyro clips.";
-    GYRO_UNIT = "gyro_unit": "Unit of the recorded rates.";
-    IGNORE_COVARIANCE_FLAG = "ignore_covariance_flag": "Take values that a message marks as absent.";
-    INIT = "init": "The attitude at the start.";
-    JOIN = "join": "Several files are one recording.";
-    LISTEN = "listen": "An address that is listened on.";
-    MAG_HARD_IRON = "mag_hard_iron": "Hard iron, to be learned.";
-    MAG_MOUNT = "mag_mount": "Mounting of the magnetometer.";
-    MAG_TOPIC = "mag_topic": "The topic of the magnetic field, where it has one of its own.";
-    MAX_GAP = "max_gap": "The longest gap that is bridged.";
-    METHOD = "method": "How rates are integrated.";
-    MOUNT = "mount": "Mounting of the sensor.";
-    NOISE = "noise": "What the sensor adds.";
-    ON_GAP = "on_gap": "What happens at a longer gap.";
-    RATE_HZ = "rate_hz": "Samples a second, where stamps do not say.";
-    REF_TOPIC = "ref_topic": "The topic of the reference.";
-    REGULARISE_STAMPS = "regularise_stamps": "Straighten the stamps.";
-    SAMPLE_KIND = "sample_kind": "What a sample means in time.";
-    SENSOR_DELAY = "sensor_delay": "By how much samples are later than their stamps.";
-    SHARD = "shard": "Which part of many recordings is done.";
-    SMOOTH = "smooth": "The recording as a whole.";
-    START = "start": "Where in the recording it begins.";
-    START_STAMP = "start_stamp": "The first stamp of what is simulated.";
-    TIME = "time": "Which clock counts.";
-    TOKEN_FILE = "token_file": "The file with a secret.";
-    TOPIC = "topic": "Which topic, or sensor.";
-    UNDO_TRUNCATION = "undo_truncation": "Put back what a driver has cut off.";
-    UNTIL = "until": "Where in the recording it ends.";
-    WINDOW = "window": "Samples that are integrated together.";
-    WORLD = "world": "Axes of the world.";
+    ACCEL_SIGN = "accel_sign";
+    ACCEL_TOPIC = "accel_topic";
+    AGAINST_RECORDED = "against_recorded";
+    AID = "aid";
+    BIAS = "bias";
+    BODY = "body";
+    CALIBRATION = "calibration";
+    COLUMNS = "columns";
+    COPY_INPUT = "copy_input";
+    DECLINATION = "declination";
+    DELIMITER = "delimiter";
+    EARTH_RATE = "earth_rate";
+    ENCODING = "encoding";
+    FIELD = "field";
+    FORCE = "force";
+    GYRO_RANGE = "gyro_range";
+    GYRO_UNIT = "gyro_unit";
+    IGNORE_COVARIANCE_FLAG = "ignore_covariance_flag";
+    INIT = "init";
+    JOIN = "join";
+    LISTEN = "listen";
+    MAG_HARD_IRON = "mag_hard_iron";
+    MAG_MOUNT = "mag_mount";
+    MAG_TOPIC = "mag_topic";
+    MAX_GAP = "max_gap";
+    METHOD = "method";
+    MOUNT = "mount";
+    NOISE = "noise";
+    ON_GAP = "on_gap";
+    ORDER = "order";
+    RATE_HZ = "rate_hz";
+    REF_TOPIC = "ref_topic";
+    REGULARISE_STAMPS = "regularise_stamps";
+    SAMPLE_KIND = "sample_kind";
+    SENSOR_DELAY = "sensor_delay";
+    SHARD = "shard";
+    SMOOTH = "smooth";
+    START = "start";
+    START_STAMP = "start_stamp";
+    TIME = "time";
+    TOKEN_FILE = "token_file";
+    TOPIC = "topic";
+    UNDO_TRUNCATION = "undo_truncation";
+    UNTIL = "until";
+    WINDOW = "window";
+    WORLD = "world";
 }
 
 #[cfg(test)]
@@ -174,12 +205,9 @@ mod tests {
     #[test]
     fn every_setting_is_listed_once_and_named_as_a_field() {
         for (n, setting) in ALL.iter().enumerate() {
-            assert!(
-                setting
-                    .name()
-                    .bytes()
-                    .all(|b| b.is_ascii_lowercase() || b == b'_')
-            );
+            let is_letter = |b: u8| b.is_ascii_lowercase() || b == b'_';
+            assert!(setting.name().bytes().all(is_letter));
+            assert_eq!(setting.key(), setting.name().replace('_', "-"));
             assert!(!ALL[n + 1..].contains(setting), "{}", setting.name());
         }
     }

@@ -29,6 +29,18 @@ pub enum World {
 }
 
 impl World {
+    /// Name of the world as a setting has it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            World::Start => "start",
+            World::Level => "level",
+            World::Enu => "enu",
+            World::Ned => "ned",
+            World::Nwu => "nwu",
+        }
+    }
+
     /// The pair of world and body axes; `None` for [`World::Start`] and [`World::Level`], which name no
     /// direction on the ground.
     #[must_use]
@@ -54,20 +66,16 @@ impl FromStr for World {
             "nwu" => Ok(World::Nwu),
             "level" => Ok(World::Level),
             "start" => Ok(World::Start),
-            _ => Err(ParseWorldError { text: quoted(text) }),
+            _ => Err(ParseWorldError {
+                text: quoted(text, 16),
+            }),
         }
     }
 }
 
 impl fmt::Display for World {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            World::Start => "start",
-            World::Level => "level",
-            World::Enu => "enu",
-            World::Ned => "ned",
-            World::Nwu => "nwu",
-        })
+        f.write_str(self.name())
     }
 }
 

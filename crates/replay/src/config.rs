@@ -5,131 +5,54 @@ pub mod calibration;
 use crate::error::{Error, Result};
 use std::fmt::Display;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Truncation};
-use strapd_attitude::quaternion::{BodyRate, Quaternion, YawPitchRoll};
-use strapd_attitude::setting::{BIAS, FIELD, INIT, NOISE, SHARD, UNDO_TRUNCATION};
+use strapd_attitude::estimate::settings::with;
+use strapd_attitude::estimate::{Aid, Initial, Noise, Plan};
+use strapd_attitude::setting::{ACCEL_TOPIC, AID, FIELD, INIT, MAG_TOPIC, NOISE, SHARD};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
 use strapd_recording::{Selection, TopicBeside};
 
-/// `--undo-truncation`: `auto`, `on`, `on=STEP` (rad/s), `off`.
-///
-/// # Errors
-/// [`Error::Usage`] for anything but `auto`, `on`, `on=STEP`, `off`.
-pub fn parse_truncation(text: &str) -> Result<Truncation> {
-    Ok(match text {
-        "auto" => Truncation::Auto,
-        "on" => Truncation::On,
-        "off" => Truncation::Off,
-        _ => text
-            .strip_prefix("on=")
-            .and_then(|step| step.parse().ok())
-            .filter(|step: &f64| *step > 0.0 && *step < 1.0)
-            .map(Truncation::Steps)
-            .ok_or_else(|| {
-                Error::usage(
-                    Diagnostic::new(format!("{UNDO_TRUNCATION}: `{text}` is none"))
-                        .help("auto, on, on=STEP in rad/s (below 1), or off"),
-                )
-            })?,
-    })
-}
-
-/// A class, or `arw=..` and any other of [`NOISE_FIGURES`], in the units of data sheets; each one number, or three
-/// joined by `/` for the body axes x, y, z.
+/// Noise by a class, or by figures in the units of data sheets, as setting `noise` takes it.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the part that is wrong.
 pub fn parse_noise(text: &str) -> Result<Noise> {
-    if let Some(preset) = NOISE_PRESETS.iter().find(|preset| preset.name == text) {
-        return Ok(Noise::preset(preset));
-    }
-    let wrong = |what: &str| {
-        let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.name).collect();
-        let figures = NOISE_FIGURES.map(|figure| format!("{} in {}", figure.key, figure.unit));
-        Error::usage(
-            Diagnostic::new(format!("{NOISE} {text}: {what}")).help(format!(
-                "a class ({}), or figures joined by commas ({}), each one number or three x/y/z",
-                names.join(", "),
-                figures.join(", ")
-            )),
-        )
-    };
-    let mut given = Vec::new();
-    for part in text.split(',') {
-        let (key, value) = part.split_once('=').unwrap_or((part, ""));
-        let key = key.trim();
-        if NOISE_FIGURES
-            .iter()
-            .all(|figure| figure.key != key.replace('_', "-"))
-        {
-            return Err(wrong(&format!(
-                "`{key}` is no class and no figure of noise"
-            )));
-        }
-        let axes = by_axis(value).ok_or_else(|| {
-            wrong(&format!(
-                "{key}={value} is neither one number nor three x/y/z, from 0 up"
-            ))
-        })?;
-        given.push((key, axes));
-    }
-    Noise::of_figures(text, given).map_err(|why| wrong(why.what()))
+    Ok(with(NOISE, text).map_err(Error::usage)?.noise)
 }
 
-/// One number for all axes, or three joined by `/`; finite and not negative.
-fn by_axis(text: &str) -> Option<[f64; 3]> {
-    let numbers: Option<Vec<f64>> = text
-        .split('/')
-        .map(|part| part.trim().parse::<f64>().ok())
-        .map(|v| v.filter(|v| v.is_finite() && *v >= 0.0))
-        .collect();
-    match numbers?.as_slice() {
-        [all] => Some([*all; 3]),
-        [x, y, z] => Some([*x, *y, *z]),
-        _ => None,
-    }
-}
-
-/// `identity`, `gravity`, `first-orientation`, `q=w,x,y,z`, `rpy=roll,pitch,yaw` (degrees).
+/// Initial attitude, as setting `init` takes it.
 ///
 /// # Errors
 /// [`Error::Usage`] for anything else, a quaternion that is not near unit norm included.
 pub fn parse_initial(text: &str) -> Result<Initial> {
-    match text {
-        "identity" => return Ok(Initial::Identity),
-        "gravity" => return Ok(Initial::Gravity),
-        "first-orientation" => return Ok(Initial::FirstOrientation),
-        _ => {}
-    }
-    if let Some(list) = text.strip_prefix("q=") {
-        return Ok(Initial::Given(unit_quaternion(INIT, list)?));
-    }
-    if let Some(list) = text.strip_prefix("rpy=") {
-        let [roll, pitch, yaw] = numbers::<3>(INIT.to("rpy"), list)?.map(f64::to_radians);
-        let angles = YawPitchRoll { yaw, pitch, roll };
-        return Ok(Initial::Given(Quaternion::from_yaw_pitch_roll(&angles)));
-    }
-    Err(Error::usage(format!(
-        "{INIT} {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
-    )))
+    Ok(with(INIT, text).map_err(Error::usage)?.initial)
 }
 
-/// `none`, `auto`, or `x,y,z` in rad/s.
+/// Takes the specific force, and the field, from topics of their own, which a plan without them has no use for.
 ///
 /// # Errors
-/// [`Error::Usage`] for anything else.
-pub fn parse_bias(text: &str) -> Result<Bias> {
-    match text {
-        "none" => Ok(Bias::None),
-        "auto" => Ok(Bias::Auto),
-        list => numbers::<3>(BIAS, list)
-            .map(|b| Bias::Given(BodyRate(b.into())))
-            .map_err(|_| {
-                Error::usage(format!(
-                    "{BIAS} {text}: expected none, auto, or three numbers x,y,z in rad/s"
-                ))
-            }),
+/// [`Error::Usage`] naming the topic and the aid that uses it.
+pub fn take_beside(plan: &mut Plan, [accel, mag]: [Option<&String>; 2]) -> Result<()> {
+    plan.has_forces_beside = accel.is_some();
+    for (topic, is_unused, aid) in [
+        (
+            ACCEL_TOPIC,
+            accel.is_some() && plan.aid == Aid::None,
+            "gravity",
+        ),
+        (
+            MAG_TOPIC,
+            mag.is_some() && plan.aid != Aid::GravityAndField,
+            "gravity+mag",
+        ),
+    ] {
+        if is_unused {
+            let what = format!("{topic}: nothing is taken from it with this {AID}");
+            return Err(Error::usage(
+                Diagnostic::new(what).help(AID.to(aid).to_string()),
+            ));
+        }
     }
+    Ok(())
 }
 
 /// `--topic`, `--field` and `--ignore-covariance-flag`, as given; `--accel-topic` and `--mag-topic` (`beside`),
@@ -214,28 +137,12 @@ pub fn numbers<const N: usize>(what: impl Display, list: &str) -> Result<[f64; N
         })
 }
 
-/// Four numbers of about unit norm, normalised, the value of `flag`; an initial `q=` may be left out. A norm
-/// off by more than 1 % is a mistake, not rounding.
-///
-/// # Errors
-/// [`Error::Usage`] when it is not four finite numbers of about unit norm.
-pub fn unit_quaternion<To, From>(what: impl Display, list: &str) -> Result<Quaternion<To, From>> {
-    let list = list.strip_prefix("q=").unwrap_or(list);
-    let q = numbers::<4>(&what, list)?;
-    let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
-    if (norm - 1.0).abs() > 0.01 {
-        return Err(Error::usage(format!(
-            "{what} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
-        )));
-    }
-    Ok(Quaternion::assume_unit(q.map(|v| v / norm)))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use strapd_attitude::propagate;
+    use strapd_attitude::quaternion::Quaternion;
 
     const DEG: f64 = std::f64::consts::PI / 180.0;
 

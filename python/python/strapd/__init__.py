@@ -11,12 +11,13 @@ Quaternions are w, x, y, z and take **body to world**; the documentation is ``do
 from ._attitude import STATUS_BITS, Attitude
 from ._compare import compare
 from ._errors import Error, LossWarning, ResolutionWarning, SmoothingWarning
-from ._estimation import Estimator, Settings, estimate, integrate
+from ._estimation import Estimator, estimate, integrate
 from ._recordings import Finding, Log, check, replay
 
 # Not in __all__: `from strapd import *` is to leave Python's own alone.
 from ._recordings import open as open  # noqa: A004
 from ._samples import Samples, Simulation, read, simulate
+from ._settings import Settings
 from ._strapd import __version__
 
 __all__ = [

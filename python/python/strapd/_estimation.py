@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import warnings
-from typing import TYPE_CHECKING, Any, Literal, Optional, TypedDict, Union
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -13,53 +12,17 @@ import numpy.typing as npt
 from . import _inputs, _strapd
 from ._attitude import Attitude
 from ._errors import Error, LossWarning, SmoothingWarning
+from ._settings import Aid, Kind, Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from typing_extensions import Unpack
-
-Kind = Literal["rate", "average", "delta-angle", "rotation"]
-Aid = Literal["auto", "none", "gravity", "gravity+mag"]
-Vector = Union["Sequence[float]", npt.NDArray[np.float64]]
-
-
-class Settings(TypedDict, total=False):
-    """What can be said of a sensor and of the run, under the names of the command's flags (``strapd help replay``)."""
-
-    window: Optional[int]
-    order: Union[int, str, None]
-    gyro_unit: Optional[Literal["rad", "deg", "mrad"]]
-    body: Optional[str]
-    world: Optional[Literal["start", "level", "enu", "ned", "nwu"]]
-    mount: Optional[Vector]
-    init: Union[Literal["identity", "gravity", "first-orientation"], Vector, None]
-    bias: Union[Literal["none", "auto"], Vector, None]
-    max_gap: Optional[float]
-    on_gap: Optional[Literal["hold", "bridge", "reset"]]
-    earth_rate: Optional[float]
-    regularise_stamps: Optional[bool]
-    gyro_range: Optional[float]
-    noise: Union[str, dict[str, Any], None]
-    accel_sign: Optional[Literal["specific", "kinematic"]]
-    mag_mount: Optional[Vector]
-    mag_hard_iron: Optional[float]
-    declination: Optional[float]
-    undo_truncation: Union[Literal["auto", "on", "off"], float, None]
-    sensor_delay: Optional[float]
-    calibration: Union[str, os.PathLike[str], dict[str, Any], None]
-    start: Optional[float]
-    until: Optional[float]
 
 
 def _ready(settings: dict[str, Any]) -> dict[str, Any]:
     """The settings as the compiled half takes them."""
     if settings.get("calibration") is not None:
         settings["calibration"] = _inputs.calibration(settings["calibration"])
-    for name in ("mount", "mag_mount", "init", "bias"):
-        if isinstance(settings.get(name), np.ndarray):
-            settings[name] = settings[name].tolist()
-    return settings
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in settings.items()}
 
 
 def _optional(name: str, value: Optional[npt.ArrayLike], n: int, width: int = 3) -> Optional[_inputs.Floats]:

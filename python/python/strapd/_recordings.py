@@ -11,21 +11,18 @@ import numpy as np
 from . import _strapd
 from ._attitude import Attitude
 from ._estimation import tell, tell_smoothing
+from ._settings import ENVIRONMENT, SETTINGS
 
 if TYPE_CHECKING:
     from ._samples import Samples
 
 Path = Union[str, "os.PathLike[str]"]
 
-#: The flags of ``strapd replay`` that are arguments here, ``-`` as ``_``.
-FLAGS = frozenset(
-    """topic time rate_hz field columns delimiter method window order sample_kind aid smooth accel_topic accel_sign mag_topic
-    mag_mount mag_hard_iron declination undo_truncation sensor_delay gyro_unit body world mount init bias calibration max_gap on_gap
-    earth_rate regularise_stamps gyro_range ignore_covariance_flag noise start until out_rate threads""".split()
-)
+#: The flags of ``strapd replay`` that are arguments here, ``-`` as ``_``: every setting, and how a log is read.
+FLAGS = SETTINGS | frozenset("topic field columns delimiter accel_topic mag_topic ignore_covariance_flag out_rate threads".split())
 
-#: Those that the environment may say too: STRAPD_AID and so on, as for the command.
-OF_THE_ENVIRONMENT = ("time", "method", "sample_kind", "aid", "undo_truncation", "gyro_unit", "body", "world", "threads")
+#: Those that the environment may say too, as for the command.
+OF_THE_ENVIRONMENT = {**ENVIRONMENT, "threads": "STRAPD_THREADS"}
 
 
 def word(name: str, value: Any) -> str:
@@ -48,7 +45,7 @@ def word(name: str, value: Any) -> str:
 
 def of_the_environment() -> dict[str, list[str]]:
     """What the environment says, as :func:`arguments`."""
-    said = {name: os.environ.get(f"STRAPD_{name.upper()}") for name in OF_THE_ENVIRONMENT}
+    said = {name: os.environ.get(variable) for name, variable in OF_THE_ENVIRONMENT.items()}
     return {name: [word] for name, word in said.items() if word}
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _strapd
-from ._estimation import Kind, tell
+from ._estimation import tell
 from ._recordings import Path, arguments, note, place, word
+from ._settings import Kind
 
 Floats = npt.NDArray[np.float64]
 Nanos = npt.NDArray[np.int64]

@@ -1,7 +1,6 @@
 //! The flags every motion takes: how it is sampled, where the samples go. Pure.
 
 use super::{Made, parameter};
-use crate::cli::estimation::KindArg;
 use crate::cli::known_words;
 use crate::cli::replay::CompressionArg;
 use crate::cli::serving::{Served, Serving};
@@ -96,8 +95,8 @@ pub struct Common {
     pub duration: f64,
     /// Meaning of a sample: the rate at its stamp, the mean over the interval that ends at its stamp, the
     /// integral over it, or the whole rotation in it
-    #[arg(long, help_heading = "Sampling", value_enum, default_value = "rate")]
-    pub sample_kind: KindArg,
+    #[arg(long, help_heading = "Sampling", default_value = "rate", value_parser = known_words::sample_kind())]
+    pub sample_kind: String,
     /// Position of the accelerometer: from the point whose motion it is, m, body axes (ahead, left, up)
     #[arg(
         long,
@@ -227,7 +226,7 @@ impl Common {
     /// # Errors
     /// [`Error::Usage`] naming the flag.
     pub(super) fn simulation(&self, name: &str, made: Made) -> Result<(Simulation, Served)> {
-        let kind = SampleKind::from(self.sample_kind);
+        let kind = SampleKind::named(&self.sample_kind).unwrap_or_default();
         let start = stamp("--start-stamp", &self.start_stamp)?;
         let error = ImuError::parse(&self.noise).map_err(|e| {
             Error::usage(Diagnostic::from(&e).at(format_args!("--noise {}", self.noise)))

@@ -118,9 +118,7 @@ enum Joining {
 pub fn live_plan(plan: &Plan) -> Result<Plan, Diagnostic> {
     let mut plan = plan.clone();
     if plan.method == Method::Auto {
-        plan.method = "commit"
-            .parse::<Method>()
-            .map_err(|e| Diagnostic::from(&e))?;
+        plan.method = Method::COMMIT;
     }
     let resolved = Meaning::new(&plan, &Declared::default());
     // An orientation and a specific force, so that only what no sample can bring is refused.

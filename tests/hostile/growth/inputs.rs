@@ -4,6 +4,7 @@
 use crate::made_databases::database;
 use crate::parsers;
 use std::ops::ControlFlow;
+use strapd_attitude::estimate::settings::{self, ROWS, Value};
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::framing::Framer;
 use strapd_recording::decode::{Channel, FieldPath, Options, decode_line, role};
@@ -183,10 +184,9 @@ fn arguments(data: &[u8]) {
     let _ = strapd::sink::Target::parse(text);
     let _ = strapd::sink::address::Listen::parse(text);
     let _ = strapd::client::remote::Remote::parse(text);
-    let _ = strapd::config::parse_initial(text);
-    let _ = strapd::config::parse_bias(text);
-    let _ = strapd::config::parse_noise(text);
-    let _ = text.parse::<strapd_attitude::propagate::Method>();
+    for row in &ROWS {
+        let _ = row.apply(&mut settings::defaults(), &Value::Text(text));
+    }
     let _ = strapd_replay::shell::quoted(text);
 }
 

@@ -27,7 +27,7 @@ pub enum Clock {
 impl Clock {
     /// The name used by `--time`.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Clock::Header => "header",
             Clock::Log => "log",

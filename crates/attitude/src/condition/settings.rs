@@ -29,7 +29,7 @@ pub enum OnGap {
 impl OnGap {
     /// The name used by `--on-gap`.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             OnGap::Hold => "hold",
             OnGap::Bridge => "bridge",
@@ -111,7 +111,11 @@ impl Default for Settings {
 }
 
 /// Longest `max_gap_secs`: a day. Nothing was measured across a longer one.
-const MAX_GAP_SECS: f64 = 86_400.0;
+pub(crate) const MAX_GAP_SECS: f64 = 86_400.0;
+/// Sample rates there are, Hz.
+pub(crate) const SAMPLE_RATES: (f64, f64) = (1e-3, 1e9);
+/// Longest time after the start of the data, s.
+pub(crate) const LONGEST_SECS: f64 = 1e9;
 /// Largest window: its only cost is latency and memory, but both must stay bounded.
 const MAX_WINDOW: usize = 4096;
 /// A rotation matrix given by a person to six digits passes; a scaled or sheared one does not.
@@ -173,7 +177,7 @@ impl Settings {
             ));
         }
         if let Clock::Index { rate_hz } = self.clock
-            && !(rate_hz.is_finite() && (1e-3..=1e9).contains(&rate_hz))
+            && !(rate_hz.is_finite() && (SAMPLE_RATES.0..=SAMPLE_RATES.1).contains(&rate_hz))
         {
             return fail(format!(
                 "{RATE_HZ}: {rate_hz} is not a sample rate (0.001 to 1e9 Hz)"
@@ -216,7 +220,7 @@ impl Settings {
         }
         for (flag, value) in [(START, self.start), (UNTIL, self.until)] {
             if let Some(secs) = value
-                && !(secs.is_finite() && secs.abs() <= 1e9)
+                && !(secs.is_finite() && secs.abs() <= LONGEST_SECS)
             {
                 return fail(format!("{flag}: {secs} s is not a time after the start"));
             }

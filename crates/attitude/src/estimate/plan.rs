@@ -12,7 +12,7 @@ use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
 use crate::setting::{
     AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_HARD_IRON, MAG_MOUNT, METHOD,
-    REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, WORLD,
+    RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, UNDO_TRUNCATION, WORLD,
 };
 use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
@@ -23,71 +23,86 @@ const BIAS_LEFT: f64 = 1e-3;
 /// Bias left in a gyro whose bias was found at rest, rad/s (0.15 deg/s): in motion it is another.
 const BIAS_LEFT_BY_REST: f64 = 2.6e-3;
 
-/// Settings by which the samples of a run are understood and integrated: the estimation flags, checked.
-/// `None` = the format decides where it states it, else the default.
+/// Settings by which the samples of a run are understood and integrated, as a person gives them by the rows of
+/// [`ROWS`](super::settings::ROWS), or a program by its fields. [`Plan::check`] refuses what cannot be.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// `--method`, `--window`, `--order`.
+    /// Method by which rates become rotations, with its window and order. A centred one is the most accurate, a causal
+    /// one and `commit` need no later sample. Default: [`Method::Auto`]. Settings `method`, `window`, `order`.
     pub method: Method,
-    /// `--sample-kind`.
+    /// Meaning of a sample in time. Taken wrongly, the attitude is half an interval early or late. Default: `None`, as the
+    /// format states it, else [`SampleKind::Rate`].
     pub kind: Option<SampleKind>,
-    /// `--gyro-unit`.
+    /// Unit of the recorded rates. Default: `None`, as the format states it, else rad/s.
     pub unit: Option<GyroUnit>,
-    /// `--body`.
+    /// Axes of the recorded vectors, which are relabelled to forward, left, up. Default: `None`, as the format states
+    /// them, else [`BodyAxes::Flu`].
     pub body: Option<BodyAxes>,
-    /// `--world`.
+    /// World against which attitudes are given. Default: [`World::Start`], which an aid replaces by the one it knows.
     pub world: World,
-    /// `--mount`: q_bs.
+    /// Rotation q_bs from sensor to body axes, applied after `body`. Default: `None`, no rotation.
     pub mount: Option<Quaternion<Body, Sensor>>,
-    /// `--time`, `--rate-hz`.
+    /// Clock whose stamps count: every interval is a step between two of them. Default: [`Clock::Header`]. Settings
+    /// `time`, `rate_hz` (Hz).
     pub clock: Clock,
-    /// `--init`, in the convention of `world`.
+    /// Attitude at the first sample, in the convention of `world`. Where gravity aids, it sets the heading alone.
+    /// Default: [`Initial::Identity`].
     pub initial: Initial,
-    /// `--bias`.
+    /// Bias of the gyro, rad/s about the body axes, subtracted from every rate; what is left of it drifts, or is
+    /// estimated by an aid. Default: [`Bias::Unsaid`].
     pub bias: Bias,
-    /// `--max-gap`.
+    /// Longest gap that is interpolated across, s. Default: 0.5.
     pub max_gap_secs: f64,
-    /// `--on-gap`.
+    /// Treatment of a longer gap. Default: [`OnGap::Hold`], which adds no rotation.
     pub on_gap: OnGap,
-    /// `--earth-rate`: latitude of a fixed site whose turning with the Earth is taken out. In degrees,
-    /// as given, so that it is repeated as given.
+    /// Latitude of a fixed site whose rotation with the Earth is taken out, degrees, north positive (as given, so that
+    /// it is repeated as given). Default: `None`, the Earth's rotation stays in the rates as a bias of 15 deg/h.
+    /// Setting `earth_rate`.
     pub latitude_deg: Option<f64>,
-    /// `--regularise-stamps`.
+    /// Whether stamps that jitter are replaced by evenly spaced ones; only for a sensor that samples evenly. Default:
+    /// `false`.
     pub regularise_stamps: bool,
-    /// `--gyro-range`, rad/s.
+    /// Full scale of the gyro, rad/s: components at or beyond it are marked saturated. Default: `None`, unknown.
     pub gyro_range: Option<f64>,
-    /// `--noise`.
+    /// Noise of the sensor: sigma of the attitude grows by it, and the filter expects it. Default: the class `consumer`.
     pub noise: Noise,
-    /// `--aid`.
+    /// Measurements that correct the attitude of the gyro: gravity holds the tilt, a magnetic field the heading. Default:
+    /// [`Aid::None`]; of a run by the table [`Aid::Auto`].
     pub aid: Aid,
-    /// `--smooth`: the whole recording at once, all attitudes at its end.
+    /// Whether the recording is estimated as a whole, with all attitudes at its end and the sensor calibrated from it.
+    /// Default: `false`, a filter.
     pub smooth: bool,
-    /// `--accel-sign`: the accelerometer says down at rest, not up.
+    /// Whether the accelerometer reads down at rest (kinematic acceleration), not up (specific force). The wrong one
+    /// turns the attitude upside down. Default: `false`. Setting `accel_sign`.
     pub is_accel_kinematic: bool,
-    /// Specific forces come by [`Estimator::take_beside`](super::Estimator::take_beside), not with the rates.
+    /// Whether specific forces come by [`Estimator::take_beside`](super::Estimator::take_beside), not with the rates.
+    /// Default: `false`.
     pub has_forces_beside: bool,
-    /// `--mag-mount`: q_bs of the magnetometer; `None` = as the gyro.
+    /// Rotation q_bs from the magnetometer's to body axes. Default: `None`, as the gyro's.
     pub mag_mount: Option<Quaternion<Body, Sensor>>,
-    /// `--mag-hard-iron`: prior sigma of hard iron that is looked for, as a share of the field; 0: none is.
+    /// Prior sigma of hard iron that is estimated, as a share of the field, 0 to 1. It costs accuracy where there is no
+    /// hard iron. Default: 0, none is estimated.
     pub mag_hard_iron: f64,
-    /// `--declination`, rad: how far magnetic north lies east of true north.
+    /// Declination, rad: how far magnetic north lies east of true north, which is added to the heading by the field.
+    /// Default: 0, headings are magnetic. The setting is in degrees.
     pub declination: f64,
-    /// `--undo-truncation`.
+    /// Treatment of rates that their driver cut towards zero: half a step is put back, without which a bias seen at rest
+    /// is wrong in motion. Default: [`Truncation::Unsaid`]. Setting `undo_truncation`.
     pub truncation: Truncation,
-    /// `--sensor-delay`, s.
+    /// Delay of the sensor's own filters, s: each attitude is rotated on by its rate for so long. Default: 0.
     pub sensor_delay_secs: f64,
-    /// `--calibration`: what is known of the sensor beforehand.
+    /// Calibration of the sensor: its values are taken out first, and the filter begins with its sigmas. Default: `None`.
     pub calibration: Option<Arc<SensorCalibration>>,
-    /// `--start`, s.
+    /// Time after the first stamp before which samples are left out, s. Default: `None`.
     pub start: Option<f64>,
-    /// `--until`, s.
+    /// Time after the first stamp behind which samples are left out, s. Default: `None`.
     pub until: Option<f64>,
 }
 
 /// Longest delay of a sensor's own filters, s.
-const LONGEST_DELAY: f64 = 0.1;
+pub(super) const LONGEST_DELAY: f64 = 0.1;
 
-/// `--aid`: what corrects the attitude of the gyro.
+/// Measurements that correct the attitude of the gyro.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum Aid {
     /// Nothing.
@@ -101,7 +116,7 @@ pub enum Aid {
     Auto,
 }
 
-/// `--undo-truncation`: what becomes of rates that their driver cut towards zero.
+/// Treatment of rates that their driver cut towards zero.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum Truncation {
     /// Decided by the data of a file where the attitude is aided; otherwise they stay.
@@ -118,7 +133,7 @@ pub enum Truncation {
 }
 
 impl Default for Plan {
-    /// Defaults of the command line, but for [`Aid::None`].
+    /// Defaults of [`settings`](super::settings::defaults), but for [`Aid::None`].
     fn default() -> Plan {
         Plan {
             method: Method::Auto,
@@ -162,8 +177,23 @@ impl Plan {
     /// Checks what can be judged without the data.
     ///
     /// # Errors
-    /// In words, naming the flag.
+    /// In words, naming the setting.
     pub fn check(&self) -> Result<(), Diagnostic> {
+        if let Clock::Index { rate_hz } = self.clock
+            && rate_hz.is_nan()
+        {
+            return Err(
+                Diagnostic::new(format!("{TIME} index: the sample rate is needed too"))
+                    .help(format!("{RATE_HZ} HZ")),
+            );
+        }
+        if let Truncation::Steps(step) = self.truncation
+            && !(step > 0.0 && step < 1.0)
+        {
+            return Err(Diagnostic::new(format!(
+                "{UNDO_TRUNCATION} on={step}: a step in rad/s above 0 and below 1 is needed"
+            )));
+        }
         let conditioning = condition::Settings {
             clock: self.clock,
             max_gap_secs: self.max_gap_secs,
@@ -264,7 +294,7 @@ impl Plan {
         Ok(())
     }
 
-    /// A calibration is one of a sensor, and says no other bias than `--bias`.
+    /// A calibration is one of a sensor, and says no other bias than the plan.
     fn check_calibration(&self) -> Result<(), Diagnostic> {
         let Some(known) = &self.calibration else {
             return Ok(());
@@ -314,7 +344,7 @@ impl Plan {
         Err(refused.after(format_args!("{SMOOTH} with")))
     }
 
-    /// `--earth-rate` needs a latitude that is one, and a world in which the Earth's axis has a place.
+    /// The Earth's rotation needs a latitude that is one, and a world in which the Earth's axis has a place.
     fn check_earth_rate(&self) -> Result<(), Diagnostic> {
         let Some(latitude) = self.latitude_deg else {
             return Ok(());
@@ -338,7 +368,7 @@ impl Plan {
     }
 }
 
-/// `--init`.
+/// Attitude at the first sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Initial {
     /// World = body at the first sample.
@@ -351,7 +381,7 @@ pub enum Initial {
     Given(Quaternion<Nav, Body>),
 }
 
-/// `--bias`.
+/// Bias of the gyro that is subtracted.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Bias {
     /// Estimate from the rests of a file whose attitude is aided, where it has any that can be no turn; otherwise
@@ -376,10 +406,10 @@ impl Bias {
     }
 }
 
-/// `--noise`: what the covariance is made of. 1 sigma, about the body axes x, y, z.
+/// Noise that the covariance is made of: 1 sigma, about the body axes x, y, z.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Noise {
-    /// Name on the command line, for the summary.
+    /// Name as it was given, for the summary.
     pub name: String,
     /// Angle random walk N, rad/sqrt(s).
     pub arw: [f64; 3],

@@ -138,7 +138,9 @@ impl FromStr for AxisMap {
     /// # Errors
     /// [`AxisMapError::NotAPermutation`] unless the text is x, y and z in some order, each once.
     fn from_str(text: &str) -> Result<AxisMap, AxisMapError> {
-        let refused = || AxisMapError::NotAPermutation { text: quoted(text) };
+        let refused = || AxisMapError::NotAPermutation {
+            text: quoted(text, 16),
+        };
         let mut letters = text.chars().map(Take::from_letter);
         let mut next = || letters.next().flatten().ok_or_else(refused);
         let map = [next()?, next()?, next()?];

@@ -1,9 +1,7 @@
-//! A name on the command line -> which way to integrate. Pure.
+//! The ways to integrate. Pure.
 
-use crate::diagnostic::Diagnostic;
 use crate::record::SampleKind;
 use std::fmt;
-use std::str::FromStr;
 
 /// Largest window: beyond 24 samples equidistant interpolation has nothing left to give in `f64`.
 pub const LARGEST_WINDOW: usize = 24;
@@ -87,50 +85,28 @@ pub enum Placement {
     Causal,
 }
 
-const NAMES: [(&str, Method); 11] = [
-    ("auto", Method::Auto),
-    (
-        "magnus",
-        Method::Magnus {
-            window: 16,
-            order: Order::Exact,
-            placement: Placement::Centred,
-        },
-    ),
-    (
-        "commit",
-        Method::Live {
-            order: Order::M8,
-            finals: false,
-        },
-    ),
-    ("dcm-left", Method::DcmLeft),
-    ("dcm-right", Method::DcmRight),
-    ("dcm-mean", Method::DcmMean),
-    ("rotvec-sum", Method::RotvecSum),
-    ("coning2", Method::Coning2),
-    ("coning3", Method::Coning3),
-    ("coning4", Method::Coning4),
-    ("rk4", Method::Rk4),
-];
-
-const ORDERS: [(&str, Order); 5] = [
-    ("2", Order::M2),
-    ("4", Order::M4),
-    ("6", Order::M6),
-    ("8", Order::M8),
-    ("exact", Order::Exact),
-];
-
-const PLACEMENTS: [(&str, Placement); 2] = [
-    ("centred", Placement::Centred),
-    ("causal", Placement::Causal),
-];
-
 impl Method {
-    /// The name `--method` takes.
+    /// [`Method::Magnus`] in centred windows of 16, to [`Order::Exact`].
+    pub const MAGNUS: Method = Method::Magnus {
+        window: 16,
+        order: Order::Exact,
+        placement: Placement::Centred,
+    };
+    /// [`Method::Magnus`] that needs no later sample: windows of 5, to [`Order::M6`].
+    pub const CAUSAL: Method = Method::Magnus {
+        window: 5,
+        order: Order::M6,
+        placement: Placement::Causal,
+    };
+    /// [`Method::Live`] to [`Order::M8`], without final attitudes.
+    pub const COMMIT: Method = Method::Live {
+        order: Order::M8,
+        finals: false,
+    };
+
+    /// Name of the method as a setting has it; a causal one is called `magnus`, too.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Method::Auto => "auto",
             Method::Magnus { .. } => "magnus",
@@ -165,11 +141,6 @@ impl Method {
             other => other,
         }
     }
-
-    /// Every name, in the order of the documentation.
-    pub fn names() -> impl Iterator<Item = &'static str> {
-        NAMES.iter().map(|(name, _)| *name)
-    }
 }
 
 impl fmt::Display for Method {
@@ -197,9 +168,9 @@ impl fmt::Display for Method {
 }
 
 impl Order {
-    /// The name `--order` takes.
+    /// Name of the order as a setting has it.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Order::M2 => "2",
             Order::M4 => "4",
@@ -218,67 +189,5 @@ impl Placement {
             Placement::Centred => "centred",
             Placement::Causal => "causal",
         }
-    }
-}
-
-/// A name nobody knows; says which ones there are.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct UnknownName {
-    what: &'static str,
-    given: String,
-    known: Vec<&'static str>,
-}
-
-impl From<&UnknownName> for Diagnostic {
-    fn from(error: &UnknownName) -> Diagnostic {
-        let shown: String = error.given.chars().take(40).collect();
-        Diagnostic::new(format!("unknown {} `{}`", error.what, shown.escape_debug()))
-            .help(format!("one of {}", error.known.join(", ")))
-    }
-}
-
-impl fmt::Display for UnknownName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Diagnostic::from(self).fmt(f)
-    }
-}
-
-impl std::error::Error for UnknownName {}
-
-fn parse<T: Copy>(
-    what: &'static str,
-    table: &[(&'static str, T)],
-    s: &str,
-) -> Result<T, UnknownName> {
-    table
-        .iter()
-        .find(|(name, _)| *name == s)
-        .map(|(_, value)| *value)
-        .ok_or_else(|| UnknownName {
-            what,
-            given: s.to_owned(),
-            known: table.iter().map(|(name, _)| *name).collect(),
-        })
-}
-
-impl FromStr for Method {
-    type Err = UnknownName;
-    /// `magnus` and `commit` come with their default window and order.
-    fn from_str(s: &str) -> Result<Self, UnknownName> {
-        parse("method", &NAMES, s)
-    }
-}
-
-impl FromStr for Order {
-    type Err = UnknownName;
-    fn from_str(s: &str) -> Result<Self, UnknownName> {
-        parse("order", &ORDERS, s)
-    }
-}
-
-impl FromStr for Placement {
-    type Err = UnknownName;
-    fn from_str(s: &str) -> Result<Self, UnknownName> {
-        parse("placement", &PLACEMENTS, s)
     }
 }

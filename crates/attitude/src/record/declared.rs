@@ -32,7 +32,7 @@ impl GyroUnit {
 
     /// The name used by `--gyro-unit`.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             GyroUnit::Rad => "rad",
             GyroUnit::Deg => "deg",

@@ -9,5 +9,6 @@ mod covariance;
 mod properties;
 mod rests;
 mod sensor_error;
+mod settings;
 #[path = "../../../../tests/shared_data/mod.rs"]
 mod shared_data;

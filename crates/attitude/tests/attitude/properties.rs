@@ -549,9 +549,4 @@ fn settings_that_can_not_be_are_refused_with_the_flag_that_helps() {
         };
         assert!(refused(turning).contains("earth_rate"));
     }
-    let unknown = "qauternion".parse::<Method>().unwrap_err().to_string();
-    assert!(unknown.contains("`qauternion`") && unknown.contains("auto, magnus, commit"));
-    for name in Method::names() {
-        assert_eq!(name.parse::<Method>().unwrap().name(), name);
-    }
 }

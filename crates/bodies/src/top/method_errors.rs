@@ -6,11 +6,13 @@
 use crate::rigid_body::Spin;
 use crate::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun, compare};
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::settings::{row, with};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::propagate::{Method, Noise, Propagator, Sequential, Settings};
 use strapd_attitude::quaternion::kernel as quat;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::{Join, Measured, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::setting::METHOD;
 
 /// A way to find the attitude of the top.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -51,16 +53,23 @@ impl How {
             .map(|name| {
                 TopMethod::from_name(name)
                     .map(How::Top)
-                    .or_else(|| name.parse().ok().map(How::Samples))
+                    .or_else(|| of_samples().find(|m| m.name() == name).map(How::Samples))
                     .ok_or_else(|| {
                         let own = TopMethod::ALL.iter().map(|m| m.name());
-                        let all: Vec<&str> = own.chain(Method::names()).collect();
+                        let all: Vec<&str> = own.chain(of_samples().map(Method::name)).collect();
                         Diagnostic::new(format!("unknown method `{}`", name.escape_debug()))
                             .help(format!("one of {}", all.join(", ")))
                     })
             })
             .collect()
     }
+}
+
+/// Methods of the setting that go by their own names.
+fn of_samples() -> impl Iterator<Item = Method> {
+    let words = row(METHOD.name()).into_iter().flat_map(|row| row.words);
+    let methods = words.map(|word| (word.name, with(METHOD, word.name)));
+    methods.filter_map(|(name, plan)| Some(plan.ok()?.method).filter(|m| m.name() == name))
 }
 
 /// Largest angles between a method's attitude and the truth, rad.

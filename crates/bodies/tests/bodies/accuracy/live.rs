@@ -54,7 +54,7 @@ fn run(method: Method, kind: SampleKind, samples: &[RateSample]) -> Vec<Attitude
 
 #[test]
 fn commit_by_name_takes_six_rates_or_five_increments() {
-    let named: Method = "commit".parse().unwrap();
+    let named = Method::COMMIT;
     for (kind, expected) in [
         (SampleKind::Rate, 6),
         (SampleKind::Average, 5),

@@ -1,0 +1,427 @@
+//! The table itself, in the order in which rows are applied and help lists them.
+
+use super::{Default, Row, Takes, Word};
+use crate::condition::{Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES};
+use crate::diagnostic::Diagnostic;
+use crate::estimate::plan::{
+    Aid, Bias, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise, Plan, Truncation,
+};
+use crate::frames::BodyAxes;
+use crate::propagate::{Method, Order};
+use crate::quaternion::BodyRate;
+use crate::record::SampleKind;
+use crate::setting::*;
+use crate::worlds::World;
+
+const fn word(name: &'static str, meaning: &'static str, set: fn(&mut Plan)) -> Word {
+    Word { name, meaning, set }
+}
+
+/// A number without words before it.
+const fn number(unit: &'static str, least: f64, most: f64, set: fn(&mut Plan, f64)) -> Takes {
+    Takes::Number {
+        before: "",
+        unit,
+        range: (least, most),
+        set,
+    }
+}
+
+/// Fields that most rows leave out.
+const ROW: Row = Row {
+    setting: TIME,
+    meaning: "",
+    effect: "",
+    default: Default::Unset(""),
+    environment: None,
+    placeholder: "",
+    words: &[],
+    takes: Takes::Words,
+    needs: |_| Ok(()),
+};
+
+/// Every setting of an estimation.
+// A row is read as one; broken at 100 columns it is a page.
+#[rustfmt::skip]
+pub static ROWS: [Row; 29] = [
+    Row {
+        setting: TIME,
+        meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
+        effect: "Every interval is the step between two stamps of this clock. `log` helps where the stamps inside the messages are zero, stand still or jump; it has the jitter of the way to the recorder.",
+        default: Default::Value("header"),
+        environment: Some("STRAPD_TIME"),
+        words: &[
+            word(Clock::Header.name(), "The stamp inside the message", |p| p.clock = Clock::Header),
+            word(Clock::Log.name(), "Time at which it was recorded", |p| p.clock = Clock::Log),
+            word(Clock::Publish.name(), "Time at which it was sent", |p| p.clock = Clock::Publish),
+            // Without a rate, which the next row sets and `Plan::check` asks for.
+            word(Clock::Index { rate_hz: 0.0 }.name(), "Number of the sample divided by {rate_hz}", |p| p.clock = Clock::Index { rate_hz: f64::NAN }),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: RATE_HZ,
+        meaning: "Sample rate for {time} index",
+        default: Default::Unset("the stamps tell"),
+        placeholder: "HZ",
+        takes: number("Hz", SAMPLE_RATES.0, SAMPLE_RATES.1, |p, rate_hz| p.clock = Clock::Index { rate_hz }),
+        needs: |p| match p.clock {
+            Clock::Index { .. } => Ok(()),
+            _ => Err(Diagnostic::new(format!("{RATE_HZ}: only {TIME} index uses it"))
+                .help(format!("{TIME} index {RATE_HZ} HZ"))),
+        },
+        ..ROW
+    },
+    Row {
+        setting: METHOD,
+        meaning: "Method by which rates become rotations. `commit` is that of `serve`: it waits for no later sample, nor for one that was overtaken",
+        effect: "`auto` is the most accurate for a recording. The methods after `commit` are there for comparison.",
+        default: Default::Value("auto"),
+        environment: Some("STRAPD_METHOD"),
+        words: &[
+            word("auto", "Centred windows of 16 rates or 15 increments, exact", |p| p.method = Method::Auto),
+            word("magnus", "A polynomial through a window of samples, integrated in closed form", |p| p.method = Method::MAGNUS),
+            word("causal", "The same through the samples so far: 5 of them, order 6", |p| p.method = Method::CAUSAL),
+            word("commit", "Without latency, and with the drift of centred windows", |p| p.method = Method::COMMIT),
+            word("dcm-left", "The rate at the start of each interval, held", |p| p.method = Method::DcmLeft),
+            word("dcm-right", "The rate at its end, held", |p| p.method = Method::DcmRight),
+            word("dcm-mean", "The mean of both", |p| p.method = Method::DcmMean),
+            word("rotvec-sum", "One rotation by the sum of all rotation vectors", |p| p.method = Method::RotvecSum),
+            word("coning2", "Coning-optimised blocks of 2 increments", |p| p.method = Method::Coning2),
+            word("coning3", "Coning-optimised blocks of 3 increments", |p| p.method = Method::Coning3),
+            word("coning4", "Coning-optimised blocks of 4 increments", |p| p.method = Method::Coning4),
+            word("rk4", "Runge-Kutta on the quaternion, the rate linear over the interval", |p| p.method = Method::Rk4),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: WINDOW,
+        meaning: "Samples in the window of {method} magnus|causal|commit (2 to 24; commit: 6 rates or 5 increments)",
+        effect: "A longer window follows smooth motion better, and noise and gaps worse.",
+        default: Default::Unset("that of the method: 16, 5 (causal), 6 rates or 5 increments (commit)"),
+        placeholder: "P",
+        takes: Takes::Count(set_window),
+        needs: has_window,
+        ..ROW
+    },
+    Row {
+        setting: ORDER,
+        meaning: "Order of the Magnus step of {method} magnus|causal|commit",
+        effect: "Order to which the non-commutativity of rotation is kept over one interval; a lower one is faster.",
+        default: Default::Unset("that of the method: exact, 6 (causal), 8 (commit)"),
+        words: &[
+            word(Order::M2.name(), "The delta angle as rotation vector; local error of order 3 in the interval", |p| set_order(p, Order::M2)),
+            word(Order::M4.name(), "One cross product; order 5", |p| set_order(p, Order::M4)),
+            word(Order::M6.name(), "Order 7", |p| set_order(p, Order::M6)),
+            word(Order::M8.name(), "Order 9", |p| set_order(p, Order::M8)),
+            word(Order::Exact.name(), "Order 9 where its error is beneath notice, else to the last bit", |p| set_order(p, Order::Exact)),
+        ],
+        needs: has_window,
+        ..ROW
+    },
+    Row {
+        setting: SAMPLE_KIND,
+        meaning: "Meaning of a sample in time",
+        effect: "It matters more than the order of the method: a mean taken for a rate is half an interval late.",
+        default: Default::Unset("rate, unless the format says otherwise"),
+        environment: Some("STRAPD_SAMPLE_KIND"),
+        words: &[
+            word(SampleKind::Rate.name(), "Instantaneous rate at the stamp", |p| p.kind = Some(SampleKind::Rate)),
+            word(SampleKind::Average.name(), "Mean rate over the interval ending at the stamp", |p| p.kind = Some(SampleKind::Average)),
+            word(SampleKind::DeltaAngle.name(), "Integral of the rate over it", |p| p.kind = Some(SampleKind::DeltaAngle)),
+            word(SampleKind::Rotation.name(), "Rotation vector of the whole rotation in it, coning included", |p| p.kind = Some(SampleKind::Rotation)),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: AID,
+        meaning: "Measurements that correct the attitude: auto (gravity where the samples carry a specific force), none (the gyro alone), gravity, gravity+mag",
+        effect: "By gravity the attitude is level from the first sample, its tilt does not drift, and the gyro's bias, scale and axes are learned; the heading stays the gyro's. By gravity+mag the heading is that of the magnetic field.",
+        default: Default::Value("auto"),
+        environment: Some("STRAPD_AID"),
+        words: &[
+            word("auto", "The accelerometer, where the samples carry a specific force", |p| p.aid = Aid::Auto),
+            word("none", "The gyro alone", |p| p.aid = Aid::None),
+            word("gravity", "The accelerometer", |p| p.aid = Aid::Gravity),
+            word("gravity+mag", "The accelerometer and a magnetometer", |p| p.aid = Aid::GravityAndField),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: SMOOTH,
+        meaning: "Smooth: the best attitude the whole recording can give, all of it at the end, with the sensor calibrated from the recording itself (needs the accelerometer; {aid} gravity+mag: heading from north)",
+        default: Default::Unset("off"),
+        takes: Takes::Switch(|p, on| p.smooth = on),
+        ..ROW
+    },
+    Row {
+        setting: ACCEL_SIGN,
+        meaning: "Reading of the accelerometer at rest: specific force (up, as most do) or kinematic acceleration (down)",
+        effect: "The data cannot show it: with the wrong one the attitude is upside down.",
+        default: Default::Value("specific"),
+        words: &[
+            word("specific", "Up at rest", |p| p.is_accel_kinematic = false),
+            word("kinematic", "Down at rest", |p| p.is_accel_kinematic = true),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: MAG_MOUNT,
+        meaning: "Rotation from the magnetometer's to body axes, as {mount}",
+        default: Default::Unset("as the gyro's"),
+        placeholder: "q=W,X,Y,Z",
+        takes: Takes::Mounting(|p, q_bs| p.mag_mount = Some(q_bs)),
+        ..ROW
+    },
+    Row {
+        setting: MAG_HARD_IRON,
+        meaning: "Learn the magnetometer's hard iron, known at the start to this share of the field (1 sigma: 0.03 to 0.1)",
+        effect: "For a magnetometer that nobody has calibrated, on a body that rotates about every axis; elsewhere it costs accuracy. 0: there is none.",
+        default: Default::Value("0"),
+        placeholder: "SIGMA",
+        takes: number("of the field", 0.0, 1.0, |p, share| p.mag_hard_iron = share),
+        ..ROW
+    },
+    Row {
+        setting: DECLINATION,
+        meaning: "Declination: how far magnetic north lies east of true north, in degrees",
+        effect: "The heading by {aid} gravity+mag is true then; without it, it is magnetic.",
+        default: Default::Value("0"),
+        placeholder: "DEG",
+        takes: number("degrees", -180.0, 180.0, |p, degrees| p.declination = degrees.to_radians()),
+        ..ROW
+    },
+    Row {
+        setting: UNDO_TRUNCATION,
+        meaning: "Put back what a driver cut from the rates towards zero, half a step: auto (a file shows it), on, on=STEP in rad/s, off",
+        effect: "Of rates that were cut the bias at rest is wrong in motion, by up to half a step.",
+        default: Default::Unset("auto where the attitude is aided, else off"),
+        environment: Some("STRAPD_UNDO_TRUNCATION"),
+        placeholder: "WHEN",
+        words: &[
+            word("auto", "Where the data of a file show it", |p| p.truncation = Truncation::Auto),
+            word("on", "In the steps that the data show", |p| p.truncation = Truncation::On),
+            word("off", "Rates stay as they are", |p| p.truncation = Truncation::Off),
+        ],
+        takes: Takes::Number {
+            before: "on=",
+            unit: "rad/s",
+            range: (0.0, 1.0),
+            set: |p, step| p.truncation = Truncation::Steps(step),
+        },
+        ..ROW
+    },
+    Row {
+        setting: SENSOR_DELAY,
+        meaning: "Delay of the sensor's own filters, in seconds",
+        effect: "Each attitude is rotated on by its rate for so long: at 10 rad/s, 2 ms are 1.1 degrees.",
+        default: Default::Value("0"),
+        placeholder: "SECS",
+        takes: number("s", -LONGEST_DELAY, LONGEST_DELAY, |p, secs| p.sensor_delay_secs = secs),
+        ..ROW
+    },
+    Row {
+        setting: GYRO_UNIT,
+        meaning: "Unit of the recorded rates",
+        default: Default::Unset("rad, unless the format says otherwise"),
+        environment: Some("STRAPD_GYRO_UNIT"),
+        words: &[
+            word(GyroUnit::Rad.name(), "rad/s", |p| p.unit = Some(GyroUnit::Rad)),
+            word(GyroUnit::Deg.name(), "deg/s", |p| p.unit = Some(GyroUnit::Deg)),
+            word(GyroUnit::Mrad.name(), "mrad/s", |p| p.unit = Some(GyroUnit::Mrad)),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: BODY,
+        meaning: "Axes of the input: flu, frd, or a map such as YxZ (which sensor axis is x, y, z of the body; lower case = reversed)",
+        default: Default::Unset("flu, unless the format says otherwise"),
+        environment: Some("STRAPD_BODY"),
+        placeholder: "AXES",
+        words: &[
+            word("flu", "x forward, y left, z up", |p| p.body = Some(BodyAxes::Flu)),
+            word("frd", "x forward, y right, z down", |p| p.body = Some(BodyAxes::Frd)),
+        ],
+        takes: Takes::Text {
+            what: "a map such as YxZ",
+            set: |p, text| {
+                p.body = Some(text.parse().map_err(|e| Diagnostic::from(&e))?);
+                Ok(())
+            },
+        },
+        ..ROW
+    },
+    Row {
+        setting: WORLD,
+        meaning: "World of the output: the axes against which the attitude is given",
+        effect: "With {aid} gravity it is `level` unless another is given, with gravity+mag `enu`.",
+        default: Default::Value("start"),
+        environment: Some("STRAPD_WORLD"),
+        placeholder: "WORLD",
+        words: &[
+            word(World::Start.name(), "The attitude at the first sample", |p| p.world = World::Start),
+            word(World::Level.name(), "z up, heading of the start", |p| p.world = World::Level),
+            word(World::Enu.name(), "x east, y north, z up", |p| p.world = World::Enu),
+            word(World::Ned.name(), "x north, y east, z down, with a body forward, right, down", |p| p.world = World::Ned),
+            word(World::Nwu.name(), "x north, y west, z up", |p| p.world = World::Nwu),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: MOUNT,
+        meaning: "Rotation from sensor to body axes, C_bs, as a quaternion: q=w,x,y,z",
+        default: Default::Unset("none"),
+        placeholder: "q=W,X,Y,Z",
+        takes: Takes::Mounting(|p, q_bs| p.mount = Some(q_bs)),
+        ..ROW
+    },
+    Row {
+        setting: INIT,
+        meaning: "Initial attitude: identity, gravity (level from the accelerometer at rest), first-orientation, q=w,x,y,z, or rpy=roll,pitch,yaw in degrees",
+        effect: "With {aid} gravity roll and pitch are level anyway, and this sets the heading.",
+        default: Default::Value("identity"),
+        placeholder: "INIT",
+        words: &[
+            word("identity", "Body axes are the world's at the first sample", |p| p.initial = Initial::Identity),
+            word("gravity", "Roll and pitch from the accelerometer at rest, yaw 0", |p| p.initial = Initial::Gravity),
+            word("first-orientation", "The first recorded orientation", |p| p.initial = Initial::FirstOrientation),
+        ],
+        takes: Takes::Attitude(|p, q_nb| p.initial = Initial::Given(q_nb)),
+        ..ROW
+    },
+    Row {
+        setting: BIAS,
+        meaning: "Gyro bias in rad/s, body axes: none, auto (from detected rest), or x,y,z",
+        effect: "It is subtracted from every rate. An uncorrected bias makes the attitude of the gyro alone drift at its own rate.",
+        default: Default::Unset("auto in a file whose attitude is aided, if it rests, else none"),
+        placeholder: "BIAS",
+        words: &[
+            word("none", "Nothing is subtracted", |p| p.bias = Bias::None),
+            word("auto", "Estimated from detected rest; refused where there is none", |p| p.bias = Bias::Auto),
+        ],
+        takes: Takes::Rate(|p, bias| p.bias = Bias::Given(BodyRate(bias.into()))),
+        ..ROW
+    },
+    Row {
+        setting: CALIBRATION,
+        meaning: "Calibration of the sensor: a TOML file, as `replay` and `calibrate` save it. serve: or a folder of such files, each for the sensor it names",
+        effect: "It is taken out first, and its sigmas are where the filter begins.",
+        default: Default::Unset("none"),
+        placeholder: "FILE",
+        takes: Takes::Calibration(|p, known| p.calibration = Some(known)),
+        ..ROW
+    },
+    Row {
+        setting: MAX_GAP,
+        meaning: "Longest gap that is bridged, in seconds",
+        effect: "The rotation over a bridged gap is interpolated; at a longer one {on_gap} holds.",
+        default: Default::Value("0.5"),
+        placeholder: "SECS",
+        takes: number("s", 0.0, MAX_GAP_SECS, |p, secs| p.max_gap_secs = secs),
+        ..ROW
+    },
+    Row {
+        setting: ON_GAP,
+        meaning: "Beyond {max_gap}: hold the attitude, bridge all the same, or reset to the initial attitude",
+        default: Default::Value("hold"),
+        words: &[
+            word(OnGap::Hold.name(), "Keep the attitude", |p| p.on_gap = OnGap::Hold),
+            word(OnGap::Bridge.name(), "Interpolate all the same", |p| p.on_gap = OnGap::Bridge),
+            word(OnGap::Reset.name(), "Go back to the initial attitude", |p| p.on_gap = OnGap::Reset),
+        ],
+        ..ROW
+    },
+    Row {
+        setting: EARTH_RATE,
+        meaning: "Take out the Earth's rotation at a fixed site, exactly: its latitude in degrees, north positive. Needs {world} enu, ned or nwu and a known heading",
+        effect: "Without it the gyro reads 15 deg/h of the Earth, which drifts as a bias does.",
+        default: Default::Unset("the Earth's rotation is left in"),
+        placeholder: "LAT_DEG",
+        takes: number("degrees", -90.0, 90.0, |p, latitude| p.latitude_deg = Some(latitude)),
+        ..ROW
+    },
+    Row {
+        setting: REGULARISE_STAMPS,
+        meaning: "Replace stamps that jitter by evenly spaced ones: a straight line through the stamps of each stretch of constant rate (a stream: a causal tracker). Only for a sensor that samples evenly",
+        default: Default::Unset("off"),
+        takes: Takes::Switch(|p, on| p.regularise_stamps = on),
+        ..ROW
+    },
+    Row {
+        setting: GYRO_RANGE,
+        meaning: "Full scale of the gyro in rad/s: samples at or beyond it are marked saturated",
+        effect: "Rotation that the gyro clips is lost: saturated samples are counted and shown.",
+        default: Default::Unset("unknown"),
+        placeholder: "RAD_S",
+        takes: number("rad/s", 0.0, f64::INFINITY, |p, range| p.gyro_range = Some(range)),
+        ..ROW
+    },
+    Row {
+        setting: NOISE,
+        meaning: "Class of the sensor: consumer, uncalibrated, industrial, tactical, navigation, or a list",
+        effect: "It says how sure the attitude is (sigma), and what the filter expects of the sensor. A list is in the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw (deg/h/sqrt(h)), turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed ({bias}); initial is the uncertainty of the initial attitude. And one number each: scale-ppm and misalignment (deg), which grow with the angle of rotation, tilt (deg) of {init} gravity.",
+        default: Default::Value("consumer"),
+        placeholder: "NOISE",
+        words: &[
+            word(NOISE_PRESETS[0].name, "A chip of consumer electronics, calibrated by its maker", |p| p.noise = Noise::preset(&NOISE_PRESETS[0])),
+            word(NOISE_PRESETS[1].name, "A cheap chip on a board that nobody has measured", |p| p.noise = Noise::preset(&NOISE_PRESETS[1])),
+            word(NOISE_PRESETS[2].name, "A calibrated module, 2 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[2])),
+            word(NOISE_PRESETS[3].name, "0.5 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[3])),
+            word(NOISE_PRESETS[4].name, "0.01 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[4])),
+        ],
+        takes: Takes::Figures(|p, noise| p.noise = noise),
+        ..ROW
+    },
+    Row {
+        setting: START,
+        meaning: "Skip the first seconds of the data",
+        default: Default::Unset("the first sample"),
+        placeholder: "SECS",
+        takes: number("s", -LONGEST_SECS, LONGEST_SECS, |p, secs| p.start = Some(secs)),
+        ..ROW
+    },
+    Row {
+        setting: UNTIL,
+        meaning: "Stop after this many seconds of the data",
+        default: Default::Unset("the last sample"),
+        placeholder: "SECS",
+        takes: number("s", 0.0, LONGEST_SECS, |p, secs| p.until = Some(secs)),
+        ..ROW
+    },
+];
+
+fn has_window(plan: &Plan) -> Result<(), Diagnostic> {
+    match plan.method {
+        Method::Magnus { .. } | Method::CommitProvisional { .. } | Method::Live { .. } => Ok(()),
+        other => Err(format!(
+            "{WINDOW} and {ORDER} belong to {METHOD} magnus, causal or commit, not to {}",
+            other.name()
+        )
+        .into()),
+    }
+}
+
+fn set_window(plan: &mut Plan, samples: usize) {
+    match &mut plan.method {
+        Method::Magnus { window, .. } | Method::CommitProvisional { window, .. } => {
+            *window = samples;
+        }
+        Method::Live { order, finals } => {
+            plan.method = Method::CommitProvisional {
+                window: samples,
+                order: *order,
+                finals: *finals,
+            };
+        }
+        _ => {}
+    }
+}
+
+fn set_order(plan: &mut Plan, given: Order) {
+    if let Method::Magnus { order, .. }
+    | Method::CommitProvisional { order, .. }
+    | Method::Live { order, .. } = &mut plan.method
+    {
+        *order = given;
+    }
+}
