@@ -88,7 +88,7 @@ fn named_figures(dict: &Bound<'_, PyDict>) -> PyResult<Vec<(String, [f64; 3])>> 
                 ))
             })?,
         };
-        Ok((key, axes))
+        Ok::<_, PyErr>((key, axes))
     };
     dict.iter().map(figure).collect()
 }

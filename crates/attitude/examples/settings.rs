@@ -29,7 +29,7 @@ A setting has one name. `max_gap` is the flag `--max-gap`, the key `max-gap` of 
 ";
 
 /// Text of `docs/settings.md`.
-pub fn page() -> String {
+pub(crate) fn page() -> String {
     let mut page = HEAD.to_owned();
     for row in &ROWS {
         page.push_str(&section(row));
@@ -87,7 +87,7 @@ Vector = Union[\"Sequence[float]\", npt.NDArray[np.float64]]
 ";
 
 /// Text of `python/python/strapd/_settings.py`.
-pub fn python() -> String {
+pub(crate) fn python() -> String {
     let mut text = PYTHON.to_owned();
     for (name, setting) in [("Kind", SAMPLE_KIND), ("Aid", AID)] {
         for row in ROWS.iter().filter(|row| row.setting == setting) {
