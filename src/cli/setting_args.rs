@@ -142,8 +142,7 @@ fn argument(row: &'static Row) -> Arg {
     let mut help = named(row.meaning);
     let mut argument = Arg::new(row.name())
         .long(row.setting.key())
-        .help_heading("Estimation")
-        .ignore_case(true);
+        .help_heading("Estimation");
     if let Takes::Switch(_) = row.takes {
         argument = argument.action(ArgAction::SetTrue);
     } else {
@@ -153,12 +152,11 @@ fn argument(row: &'static Row) -> Arg {
         }
         argument = argument
             .value_parser(OfRow(row))
+            .value_name(row.placeholder)
+            .ignore_case(true)
             .hide_possible_values(!matches!(row.takes, Takes::Words))
             .allow_negative_numbers(matches!(row.takes, Takes::Number { .. }))
             .allow_hyphen_values(matches!(row.takes, Takes::Rate(_) | Takes::Attitude(_)));
-        if !row.placeholder.is_empty() {
-            argument = argument.value_name(row.placeholder);
-        }
     }
     if let Some(variable) = row.environment {
         argument = argument.env(variable);

@@ -42,7 +42,7 @@ pub struct Row {
     pub default: Default,
     /// Environment variable that is read where the setting is not given.
     pub environment: Option<&'static str>,
-    /// Placeholder of the value in a usage; empty for the setting's name.
+    /// Placeholder of the value in a usage; empty for a switch.
     pub placeholder: &'static str,
     /// Words that are taken, in any case.
     pub words: &'static [Word],

@@ -57,6 +57,8 @@ fn every_row_says_what_it_is_and_sets_something_of_its_own() {
         assert!(names.insert(row.name()), "{} twice", row.name());
         assert!(setting::ALL.contains(&row.setting), "{}", row.name());
         assert!(!row.meaning.is_empty() && !row.expected().is_empty());
+        let is_switch = matches!(row.takes, Takes::Switch(_));
+        assert_eq!(row.placeholder.is_empty(), is_switch, "{}", row.name());
         assert!(
             row.environment
                 .is_none_or(|variable| variable == format!("STRAPD_{}", row.name().to_uppercase()))

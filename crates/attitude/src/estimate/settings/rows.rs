@@ -50,6 +50,7 @@ pub static ROWS: [Row; 29] = [
         effect: "Every interval is the step between two stamps of this clock. `log` helps where the stamps inside the messages are zero, stand still or jump; it has the jitter of the way to the recorder.",
         default: Default::Value("header"),
         environment: Some("STRAPD_TIME"),
+        placeholder: "TIME",
         words: &[
             word(Clock::Header.name(), "The stamp inside the message", |p| p.clock = Clock::Header),
             word(Clock::Log.name(), "Time at which it was recorded", |p| p.clock = Clock::Log),
@@ -78,6 +79,7 @@ pub static ROWS: [Row; 29] = [
         effect: "`auto` is the most accurate for a recording. The methods after `commit` are there for comparison.",
         default: Default::Value("auto"),
         environment: Some("STRAPD_METHOD"),
+        placeholder: "METHOD",
         words: &[
             word("auto", "Centred windows of 16 rates or 15 increments, exact", |p| p.method = Method::Auto),
             word("magnus", "A polynomial through a window of samples, integrated in closed form", |p| p.method = Method::MAGNUS),
@@ -109,6 +111,7 @@ pub static ROWS: [Row; 29] = [
         meaning: "Order of the Magnus step of {method} magnus|causal|commit",
         effect: "Order to which the non-commutativity of rotation is kept over one interval; a lower one is faster.",
         default: Default::Unset("that of the method: exact, 6 (causal), 8 (commit)"),
+        placeholder: "ORDER",
         words: &[
             word(Order::M2.name(), "The delta angle as rotation vector; local error of order 3 in the interval", |p| set_order(p, Order::M2)),
             word(Order::M4.name(), "One cross product; order 5", |p| set_order(p, Order::M4)),
@@ -125,6 +128,7 @@ pub static ROWS: [Row; 29] = [
         effect: "It matters more than the order of the method: a mean taken for a rate is half an interval late.",
         default: Default::Unset("rate, unless the format says otherwise"),
         environment: Some("STRAPD_SAMPLE_KIND"),
+        placeholder: "SAMPLE_KIND",
         words: &[
             word(SampleKind::Rate.name(), "Instantaneous rate at the stamp", |p| p.kind = Some(SampleKind::Rate)),
             word(SampleKind::Average.name(), "Mean rate over the interval ending at the stamp", |p| p.kind = Some(SampleKind::Average)),
@@ -139,6 +143,7 @@ pub static ROWS: [Row; 29] = [
         effect: "By gravity the attitude is level from the first sample, its tilt does not drift, and the gyro's bias, scale and axes are learned; the heading stays the gyro's. By gravity+mag the heading is that of the magnetic field.",
         default: Default::Value("auto"),
         environment: Some("STRAPD_AID"),
+        placeholder: "AID",
         words: &[
             word("auto", "The accelerometer, where the samples carry a specific force", |p| p.aid = Aid::Auto),
             word("none", "The gyro alone", |p| p.aid = Aid::None),
@@ -159,6 +164,7 @@ pub static ROWS: [Row; 29] = [
         meaning: "Reading of the accelerometer at rest: specific force (up, as most do) or kinematic acceleration (down)",
         effect: "The data cannot show it: with the wrong one the attitude is upside down.",
         default: Default::Value("specific"),
+        placeholder: "ACCEL_SIGN",
         words: &[
             word("specific", "Up at rest", |p| p.is_accel_kinematic = false),
             word("kinematic", "Down at rest", |p| p.is_accel_kinematic = true),
@@ -225,6 +231,7 @@ pub static ROWS: [Row; 29] = [
         meaning: "Unit of the recorded rates",
         default: Default::Unset("rad, unless the format says otherwise"),
         environment: Some("STRAPD_GYRO_UNIT"),
+        placeholder: "GYRO_UNIT",
         words: &[
             word(GyroUnit::Rad.name(), "rad/s", |p| p.unit = Some(GyroUnit::Rad)),
             word(GyroUnit::Deg.name(), "deg/s", |p| p.unit = Some(GyroUnit::Deg)),
@@ -324,6 +331,7 @@ pub static ROWS: [Row; 29] = [
         setting: ON_GAP,
         meaning: "Beyond {max_gap}: hold the attitude, bridge all the same, or reset to the initial attitude",
         default: Default::Value("hold"),
+        placeholder: "ON_GAP",
         words: &[
             word(OnGap::Hold.name(), "Keep the attitude", |p| p.on_gap = OnGap::Hold),
             word(OnGap::Bridge.name(), "Interpolate all the same", |p| p.on_gap = OnGap::Bridge),
