@@ -57,7 +57,7 @@ pub struct Row {
 pub enum Default {
     /// A value that the row takes.
     Value(&'static str),
-    /// No value; what holds then, in words.
+    /// Absence of a value; the words say what holds then.
     Unset(&'static str),
 }
 
@@ -75,9 +75,9 @@ pub struct Word {
 /// Values that a setting takes besides its words, and how they are put into a plan.
 #[derive(Clone, Copy, Debug)]
 pub enum Takes {
-    /// None: the words are all.
+    /// Nothing but the words.
     Words,
-    /// On or off.
+    /// A switch, on or off.
     Switch(fn(&mut Plan, bool)),
     /// A number.
     Number {
@@ -100,7 +100,7 @@ pub enum Takes {
     Attitude(fn(&mut Plan, Quaternion<Nav, Body>)),
     /// A text of its own.
     Text {
-        /// What it is.
+        /// Description of the text.
         what: &'static str,
         /// Reads it into a plan.
         set: fn(&mut Plan, &str) -> Result<(), Diagnostic>,
@@ -116,7 +116,7 @@ pub enum Takes {
 pub enum Value<'a> {
     /// Any value as text, as a person writes it.
     Text(&'a str),
-    /// On or off.
+    /// A switch, on or off.
     Switch(bool),
     /// A number.
     Number(f64),
@@ -197,7 +197,7 @@ impl Takes {
         }
     }
 
-    /// What the values are.
+    /// Description of the values.
     fn expected(&self) -> Option<String> {
         Some(match self {
             Takes::Words => return None,

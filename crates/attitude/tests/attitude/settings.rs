@@ -34,7 +34,7 @@ fn put(plan: &mut Plan, given: &[(&str, &str)]) -> Result<(), Diagnostic> {
     plan.check()
 }
 
-/// What is said of these settings, by whoever refuses them.
+/// Refusal of these settings.
 fn refused(given: &[(&str, &str)]) -> String {
     put(&mut defaults(), given).unwrap_err().to_string()
 }

@@ -46,7 +46,7 @@ pub(super) fn roll_pitch_yaw(text: &str) -> Option<Quaternion<Nav, Body>> {
     Some(Quaternion::from_yaw_pitch_roll(&angles))
 }
 
-/// What a list of figures is.
+/// Description of a list of figures.
 pub(super) fn figures_expected() -> String {
     let figures = NOISE_FIGURES.map(|figure| format!("{} in {}", figure.key, figure.unit));
     format!(
