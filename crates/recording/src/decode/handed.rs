@@ -24,7 +24,7 @@ pub struct Handed<'a> {
 /// Reason for which a message gives no sample.
 #[derive(Clone, Debug)]
 pub enum Refused {
-    /// Its channel is none of samples, or of a type that is not read: it is so of each message.
+    /// Channel without samples, or of a type that is not read: each of its messages is refused.
     Channel(Unsupported),
     /// The message itself cannot be read.
     Message(Undecodable),
