@@ -7,6 +7,7 @@
 mod files;
 
 use strapd_attitude::condition::{self, Conditioner, OnGap};
+use strapd_attitude::estimate::settings;
 use strapd_attitude::propagate::{
     self, LARGEST_WINDOW, Method, Order, Placement, Propagator, Sequential, Settings,
 };
@@ -27,7 +28,19 @@ const INITIAL: [f64; 4] = [0.5, -0.5, 0.5, 0.5];
 
 /// Every method by name, and windows at both ends of their range.
 fn methods() -> Vec<Method> {
-    let mut all: Vec<Method> = Method::names().map(|name| name.parse().unwrap()).collect();
+    let named = settings::row("method").unwrap();
+    let mut all: Vec<Method> = named
+        .words
+        .iter()
+        .map(|word| {
+            let mut plan = settings::defaults();
+            named
+                .apply(&mut plan, &settings::Value::Text(word.name))
+                .unwrap();
+            plan.method
+        })
+        .collect();
+    assert!(all.len() > 10);
     for window in [2, 3, LARGEST_WINDOW] {
         for placement in [Placement::Centred, Placement::Causal] {
             for order in [Order::M2, Order::M8, Order::Exact] {

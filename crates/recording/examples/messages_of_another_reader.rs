@@ -12,10 +12,13 @@ use std::error::Error;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Channel, Handed, HandedDecoders, Options, Refused};
 
+/// Samples of each topic.
+pub type Topics = BTreeMap<String, Vec<RawSample>>;
+
 /// Samples of each topic that carries rates, in the order of the file, and the number of messages that cannot be read.
-pub fn samples(log: &[u8]) -> Result<(BTreeMap<String, Vec<RawSample>>, u64), Box<dyn Error>> {
+pub fn samples(log: &[u8]) -> Result<(Topics, u64), Box<dyn Error>> {
     let mut decoders = HandedDecoders::new(Options::default());
-    let mut topics: BTreeMap<String, Vec<RawSample>> = BTreeMap::new();
+    let mut topics = Topics::new();
     let mut unreadable = 0;
     for message in mcap::MessageStream::new(log)? {
         let message = message?;

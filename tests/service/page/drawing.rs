@@ -92,7 +92,7 @@ fn the_ends_of_the_axes_are_drawn_where_the_attitude_says() {
     let mut browser = Browser::start();
     let mut settings = listening(&[TCP, WS]);
     // One rotation a sample: a quarter turn is a quarter turn.
-    settings.hub.plan.method = "dcm-right".parse().unwrap();
+    settings.hub.plan.method = strapd_attitude::propagate::Method::DcmRight;
     let daemon = Daemon::start(settings);
     let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
     let mut sender = Client::tcp(daemon.address(0));

@@ -12,7 +12,7 @@ use strapd::serve::core::hub::{Hub, Settings};
 use strapd::serve::core::session::{Scratch, Session};
 use strapd::serve::core::state::{Saved, Sensors};
 use strapd_attitude::estimate::Memory;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Plan, settings};
 use strapd_attitude::record::{Nanos, SampleKind};
 
 /// Number `n` of a lively motion at 200 Hz, in words of its own: jittered by up to 0.4 ms, one in 97 lost.
@@ -205,6 +205,11 @@ fn who_begins_further_back_than_the_window_begins_a_run() {
     assert_eq!(daemon.send(301..305).codes("NOTE"), ["new_run"]);
 }
 
+fn put(plan: &mut Plan, setting: &str, text: &str) {
+    let row = settings::row(setting).unwrap();
+    row.apply(plan, &settings::Value::Text(text)).unwrap();
+}
+
 /// Plans by which a sensor may be understood.
 fn plans() -> Vec<(&'static str, Plan)> {
     let of = |change: &dyn Fn(&mut Plan)| {
@@ -212,7 +217,7 @@ fn plans() -> Vec<(&'static str, Plan)> {
         change(&mut plan);
         plan
     };
-    let method = |text: &str| of(&|p| p.method = text.parse().unwrap());
+    let method = |text: &str| of(&|p| put(p, "method", text));
     vec![
         ("as it is", Plan::default()),
         ("averages", of(&|p| p.kind = Some(SampleKind::Average))),

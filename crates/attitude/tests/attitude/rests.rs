@@ -5,7 +5,7 @@ use strapd_attitude::estimate::{
     Aid, Bias, Estimator, Meaning, NOISE_PRESETS, Noise, Patience, Plan, Preparation, Prepared,
     at_once,
 };
-use strapd_attitude::propagate::Sequential;
+use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
 
@@ -227,7 +227,7 @@ fn what_cannot_be_read_twice_and_what_was_said_are_as_they_were() {
     let meaning = Meaning::new(&default(), &Declared::default());
     let live = at_once(&default(), &meaning, &samples[..1]).unwrap();
     let daemon = Plan {
-        method: "commit".parse().unwrap(),
+        method: Method::COMMIT,
         ..default()
     };
     let alone = Plan {

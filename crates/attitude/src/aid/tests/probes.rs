@@ -175,7 +175,7 @@ fn aided(method: propagate::Method) -> Aided {
 
 #[test]
 fn through_our_own_propagator_the_golden_case_is_as_good() {
-    for method in [propagate::Method::Auto, "commit".parse().unwrap()] {
+    for method in [propagate::Method::Auto, propagate::Method::COMMIT] {
         let mut aided = aided(method);
         let mut out = Vec::new();
         aided.push(&stream(), &mut out);
@@ -213,7 +213,7 @@ fn how_a_stream_is_cut_changes_no_bit() {
         aided.finish(&mut out);
         out
     };
-    for method in [propagate::Method::Auto, "commit".parse().unwrap()] {
+    for method in [propagate::Method::Auto, propagate::Method::COMMIT] {
         let whole = run(method, &[2001]);
         assert_eq!(run(method, &[1]), whole, "{method:?}");
         assert_eq!(run(method, &[7, 250, 1, 33]), whole, "{method:?}");

@@ -128,9 +128,15 @@ pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<us
     ["x", "y", "z"].into_iter().map(axis).collect()
 }
 
+/// Role of a table: its columns, its kind, and what a column of it is by its part.
+type Filling<'c> = (Option<&'c Chosen>, Kind, fn(usize) -> Column);
+
+/// Columns with what each of them is, and the words that would give them so.
+type Placed = (Vec<(usize, Column)>, Vec<String>);
+
 impl Fillings {
     /// Each role with its columns, and what a column of it is by its part.
-    fn each(&self) -> [(Option<&Chosen>, Kind, fn(usize) -> Column); 7] {
+    fn each(&self) -> [Filling<'_>; 7] {
         [
             (self.gyro.as_ref(), Kind::Gyro, Column::Gyro),
             (self.accel.as_ref(), Kind::Accel, Column::Accel),
@@ -240,11 +246,7 @@ impl Roles<'_> {
     ///
     /// # Errors
     /// A column that fills two roles.
-    fn placed(
-        &self,
-        fillings: &Fillings,
-        instants: &Instants,
-    ) -> Result<(Vec<(usize, Column)>, Vec<String>), Diagnostic> {
+    fn placed(&self, fillings: &Fillings, instants: &Instants) -> Result<Placed, Diagnostic> {
         let mut of: Vec<(usize, Column)> = Vec::new();
         let mut assumed = Vec::new();
         for (chosen, kind, column) in fillings.each() {
