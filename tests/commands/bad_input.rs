@@ -26,20 +26,22 @@ const SECS: f64 = 0.01;
 const RATE: [f64; 3] = [0.4, -1.1, 0.7];
 const INITIAL: [f64; 4] = [0.5, -0.5, 0.5, 0.5];
 
+/// Names of all methods.
+fn method_names() -> impl Iterator<Item = &'static str> {
+    let row = settings::row("method").unwrap();
+    row.words.iter().map(|word| word.name)
+}
+
+fn method_named(name: &str) -> Method {
+    let mut plan = settings::defaults();
+    let row = settings::row("method").unwrap();
+    row.apply(&mut plan, &settings::Value::Text(name)).unwrap();
+    plan.method
+}
+
 /// Every method by name, and windows at both ends of their range.
 fn methods() -> Vec<Method> {
-    let named = settings::row("method").unwrap();
-    let mut all: Vec<Method> = named
-        .words
-        .iter()
-        .map(|word| {
-            let mut plan = settings::defaults();
-            named
-                .apply(&mut plan, &settings::Value::Text(word.name))
-                .unwrap();
-            plan.method
-        })
-        .collect();
+    let mut all: Vec<Method> = method_names().map(method_named).collect();
     assert!(all.len() > 10);
     for window in [2, 3, LARGEST_WINDOW] {
         for placement in [Placement::Centred, Placement::Causal] {

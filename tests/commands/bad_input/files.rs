@@ -25,10 +25,10 @@ fn the_shortest_logs_give_an_attitude_for_each_sample_or_say_that_there_is_none(
             SampleKind::Average,
             SampleKind::DeltaAngle,
         ] {
-            for name in Method::names() {
+            for name in super::method_names() {
                 let plan = Plan {
                     regularise_stamps: n == 5,
-                    ..plan(name.parse().unwrap(), kind)
+                    ..plan(super::method_named(name), kind)
                 };
                 let (summary, found) = attitudes(&replay_with(&path, plan), dir.path());
                 assert_eq!(found.len(), n, "{name}, {kind:?}");
@@ -88,8 +88,8 @@ fn a_motion_too_fast_for_its_samples_is_warned_of() {
         s.gyro[2] = 400.0;
     }
     let path = written(dir.path(), "log.mcap", &samples);
-    for name in Method::names() {
-        let plan = plan(name.parse().unwrap(), SampleKind::Rate);
+    for name in super::method_names() {
+        let plan = plan(super::method_named(name), SampleKind::Rate);
         let summary = done(&replay_with(&path, plan)).unwrap();
         let said = only(&summary).warnings().join("; ");
         assert!(

@@ -8,7 +8,6 @@ use crate::sink::form::Slot;
 use crate::sink::tests::sample;
 use crate::sink::{Options, Provenance, Sink, Stream, Target};
 use strapd_attitude::record::Nanos;
-use strapd_recording::pool::Pool;
 
 /// Row of a format with one byte a sample.
 pub(super) const TOY: Row = Row {
@@ -56,7 +55,10 @@ fn a_format_of_which_the_table_has_a_row_is_listed_opened_by_its_ending_and_writ
     let refused = Sink::create(&target, &[], options, &streams, &provenance);
     assert!(matches!(refused, Err(Error::Usage(_))));
     let mut sink = Sink::create(&target, &[], options, &streams[..1], &provenance).unwrap();
-    let pool = Pool::new(1).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
     let samples = [3, 1, 4].map(|stamp| sample(Nanos(stamp)));
     let _ = sink.write(0, &samples, &pool).unwrap();
     assert_eq!(sink.finish().unwrap().messages, 3);
