@@ -36,6 +36,7 @@ mod aided;
 mod beside;
 mod calibration;
 mod covariance;
+mod evidence;
 mod filter;
 mod gravity;
 mod heading;

@@ -13,6 +13,7 @@
 mod aiding;
 mod anew;
 mod calibrated;
+mod class_pass;
 mod estimator;
 mod first_pass;
 mod integrator;
@@ -38,7 +39,9 @@ pub use intervals::{LEAST_INTERVALS, Mismatch};
 pub use kept::{Spool, SpoolError};
 pub use meaning::{Meaning, orientation_convention};
 pub use noise_figures::{NOISE_FIGURES, NoiseFigure};
-pub use plan::{Aid, Bias, Initial, NOISE_PRESETS, Noise, NoisePreset, Plan, Truncation};
+pub use plan::{
+    Aid, Bias, CLASS_BY_DATA, Initial, NOISE_PRESETS, Noise, NoisePreset, Plan, Truncation,
+};
 pub use pooled::Pooled;
 pub use preparation::{Patience, Preparation, Prepared, at_once};
 pub use sensor_calibration::{Known, SensorCalibration};

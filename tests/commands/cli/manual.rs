@@ -77,7 +77,7 @@ fn a_flag_that_knows_words_and_takes_others_is_completed_with_the_words() {
         (
             "replay",
             "noise",
-            "consumer uncalibrated industrial tactical navigation",
+            "auto consumer uncalibrated industrial tactical navigation",
         ),
         ("simulate__subcmd__random", "noise", "none consumer_mems "),
         (

@@ -4,7 +4,7 @@
 //! specific force (phones export acceleration without gravity) would level to anything.
 
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, Initial, Noise, Plan};
+use super::plan::{Aid, Initial, NOISE_PRESETS, Noise, Plan};
 use super::preparation::Prepared;
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
@@ -227,6 +227,15 @@ impl Aiding {
         Ok(Aiding::with_scale((plan, resolved), scale))
     }
 
+    /// The same for a sensor of the class of `plan`.
+    pub(super) fn of_class(self, plan: &Plan, resolved: &Meaning) -> Aiding {
+        let mut settings = Aiding::with_scale((plan, resolved), self.force_scale).settings;
+        if plan.bias.left().is_some() {
+            settings.bias_prior = self.settings.bias_prior;
+        }
+        Aiding { settings, ..self }
+    }
+
     fn with_scale((plan, resolved): (&Plan, &Meaning), force_scale: f64) -> Aiding {
         let mut settings = Settings {
             gyro_range: plan.gyro_range.unwrap_or(0.0),
@@ -235,7 +244,7 @@ impl Aiding {
             ..Settings::default()
         };
         // The filter's own numbers are those of the class that is the default; who names another knows better.
-        if plan.noise != Plan::default().noise {
+        if plan.noise.taken() != Noise::preset(&NOISE_PRESETS[0]) {
             of_class(&mut settings, &plan.noise);
         }
         if let Some(left) = plan.bias.left() {
@@ -392,7 +401,7 @@ fn force_at_first(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::estimate::{Estimator, NOISE_PRESETS, Patience, Preparation};
+    use crate::estimate::{Estimator, Patience, Preparation};
     use crate::propagate::Sequential;
     use crate::record::Declared;
 

@@ -177,7 +177,7 @@ pub fn learned(
     let undone = |matrix: Matrix3<f64>| matrix.try_inverse().unwrap_or_else(Matrix3::identity);
     let from_gyro = undone(c * known.gyro_matrix());
     let from_force = undone(c * known.force_matrix());
-    let class = plan.noise.turn_on_bias.into_iter().fold(0.0, f64::max);
+    let class = prepared.noise.turn_on_bias.into_iter().fold(0.0, f64::max);
     let switched_off = if class > 0.0 {
         SWITCHED_OFF.min(class)
     } else {
@@ -198,7 +198,7 @@ pub fn learned(
         });
     }
     if let Some(Recording { smoothed, .. }) = recording {
-        let class = [plan.noise.bias_of_class(); 3];
+        let class = [prepared.noise.bias_of_class(); 3];
         by_smoother(
             &mut known,
             (resolved, prepared),

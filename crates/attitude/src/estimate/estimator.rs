@@ -156,10 +156,10 @@ impl Estimator {
             (true, _) => Noise {
                 scale: 0.0,
                 misalignment: 0.0,
-                ..plan.noise.clone()
+                ..prepared.noise.clone()
             },
-            (false, Initial::Gravity) => plan.noise.levelled(prepared.tilt_sigma),
-            (false, _) => plan.noise.clone(),
+            (false, Initial::Gravity) => prepared.noise.levelled(prepared.tilt_sigma),
+            (false, _) => prepared.noise.clone(),
         };
         let noise = match (&plan.calibration, &prepared.aiding) {
             (Some(known), None) => known.narrowed(&noise),
@@ -195,7 +195,7 @@ impl Estimator {
                             axes: aiding.settings.cross_prior / usual.cross_prior,
                             force: aiding.settings.force_bias_prior / usual.force_bias_prior,
                         },
-                        bias_sigma: plan.noise.bias_of_class(),
+                        bias_sigma: prepared.noise.bias_of_class(),
                         gyro_range: aiding.settings.gyro_range,
                         known: Beforehand {
                             gyro_bias: aiding.stated_bias(prepared),

@@ -150,7 +150,7 @@ impl Default for Plan {
             latitude_deg: None,
             regularise_stamps: false,
             gyro_range: None,
-            noise: Noise::preset(&NOISE_PRESETS[0]),
+            noise: Noise::by_data(),
             aid: Aid::None,
             smooth: false,
             is_accel_kinematic: false,
@@ -523,7 +523,44 @@ const FLICKER: f64 = 1.7;
 /// (`docs/estimation.md`): without it one of them has 80 % of its errors within three sigma, with it every one all.
 const LEFT: f64 = 0.03;
 
+/// Name of the class that is found: the first of [`NOISE_PRESETS`] where the data of a file do not clearly tell that
+/// nobody calibrated the sensor.
+pub const CLASS_BY_DATA: &str = "auto";
+
 impl Noise {
+    /// Noise of the default class, which the data of a file may replace.
+    #[must_use]
+    pub fn by_data() -> Noise {
+        Noise {
+            name: CLASS_BY_DATA.to_owned(),
+            ..Noise::preset(&NOISE_PRESETS[0])
+        }
+    }
+
+    /// Whether the data of a file may replace it.
+    pub(super) fn is_by_data(&self) -> bool {
+        self.name == CLASS_BY_DATA
+    }
+
+    /// The same under the name of the class that it is.
+    pub(super) fn taken(&self) -> Noise {
+        if self.is_by_data() {
+            Noise::preset(&NOISE_PRESETS[0])
+        } else {
+            self.clone()
+        }
+    }
+
+    /// Noise of the class of this name, [`CLASS_BY_DATA`] included; `None` where there is none.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Noise> {
+        if name == CLASS_BY_DATA {
+            return Some(Noise::by_data());
+        }
+        let class = NOISE_PRESETS.iter().find(|class| class.name == name);
+        class.map(Noise::preset)
+    }
+
     /// Noise of a class.
     #[must_use]
     pub fn preset(class: &NoisePreset) -> Noise {

@@ -4,10 +4,11 @@
 //! seen, and what to say when it cannot be known.
 
 use super::aiding::Aiding;
+use super::class_pass::{self, ClassPass};
 use super::first_pass::{FEW, RestPass};
 use super::intervals::Mismatch;
 use super::meaning::Meaning;
-use super::plan::{Aid, Bias, Initial, Plan, Truncation};
+use super::plan::{Aid, Bias, Initial, Noise, Plan, Truncation};
 use super::stamps::{StampPass, Stamps};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::condition::truncation::Grid;
@@ -33,6 +34,8 @@ const REST_SECS: f64 = 60.0;
 pub struct Prepared {
     /// The clock.
     pub clock: Clock,
+    /// Noise of the sensor: of the class that was stated, or that its data tell.
+    pub noise: Noise,
     /// Bias removed.
     pub bias: BodyRate,
     /// Sigma of the bias, rad/s.
@@ -86,7 +89,9 @@ pub struct Preparation {
     rates: Option<Vec<[f64; 3]>>,
     /// The first specific forces that came in messages of their own.
     beside: Vec<RawSample>,
-    /// Whether there are any; before the first sample.
+    /// Samples by which the class of the sensor is found.
+    class: Option<ClassPass>,
+    /// Whether there are any such forces; before the first sample.
     forces_beside: [bool; 2],
 }
 
@@ -109,6 +114,7 @@ impl Preparation {
                 && !matches!(resolved.kind, SampleKind::DeltaAngle | SampleKind::Rotation))
             .then(Vec::new),
             beside: Vec::new(),
+            class: ClassPass::of(plan).filter(|_| patience == Patience::WholeLog),
             forces_beside: [false; 2],
         }
     }
@@ -143,6 +149,9 @@ impl Preparation {
             && rates.len() < MANY
         {
             rates.push(gyro.map(|w| w * self.resolved.unit.to_rad()));
+        }
+        if let Some(class) = &mut self.class {
+            class.take(raw);
         }
         match &mut self.rest {
             // What nobody asked for is not worth a pass over hours.
@@ -180,7 +189,11 @@ impl Preparation {
             Patience::WholeLog => {
                 let wants_rates = self.rates.as_ref().is_some_and(|rates| rates.len() < MANY);
                 let wants_rest = needs_rest(&self.plan) || self.taken < MANY;
-                (self.rest.is_some() && wants_rest) || self.stamps.is_some() || wants_rates
+                let wants_class = self.class.as_ref().is_some_and(ClassPass::wants_more);
+                (self.rest.is_some() && wants_rest)
+                    || self.stamps.is_some()
+                    || wants_rates
+                    || wants_class
             }
             Patience::FirstMinute => {
                 self.rest.is_some()
@@ -206,6 +219,7 @@ impl Preparation {
             rates,
             beside,
             forces_beside,
+            class,
             ..
         } = self;
         let (clock, warning) = choose_clock(&first, plan.clock);
@@ -300,7 +314,8 @@ impl Preparation {
         let is_wanted = aiding.is_some() || plan.truncation != Truncation::Unsaid;
         let rates = rates.as_deref().filter(|_| is_wanted);
         let truncation_step = decide_truncation(&plan, rates, &mut warnings)?;
-        Ok(Prepared {
+        let mut prepared = Prepared {
+            noise: plan.noise.taken(),
             aiding,
             truncation_step,
             clock,
@@ -315,7 +330,25 @@ impl Preparation {
             world,
             stamps,
             warnings,
-        })
+        };
+        let told = class.zip(prepared.aiding).and_then(|(class, aiding)| {
+            class.told(&class_pass::Run {
+                plan: &plan,
+                resolved: &resolved,
+                clock,
+                bias,
+                initial,
+                world_rate: prepared.world_rate,
+                truncation_step,
+                aiding,
+            })
+        });
+        if let Some((noise, aiding, why)) = told {
+            prepared.noise = noise;
+            prepared.aiding = Some(aiding);
+            prepared.warnings.push(why);
+        }
+        Ok(prepared)
     }
 }
 
@@ -391,6 +424,7 @@ pub fn at_once(
         Stamps::AsRecorded
     };
     Ok(Prepared {
+        noise: plan.noise.taken(),
         aiding,
         truncation_step: decide_truncation(plan, None, &mut warnings)?,
         clock: plan.clock,

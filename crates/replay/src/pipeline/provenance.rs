@@ -37,7 +37,6 @@ pub(super) fn of(run: &ReplayRequest, topics: &[Topic], streams: &[Stream]) -> R
     let names: Vec<String> = files.iter().map(shown).collect();
     put("input".to_owned(), names.join(", "));
     put("method".to_owned(), run.plan.method.to_string());
-    put("noise".to_owned(), run.plan.noise.name.clone());
     // The ends are read only where there is something to write the result into, and never of a
     // pipe: opening it a second time would wait for a second writer.
     if !run.source.files().is_empty()
@@ -65,6 +64,7 @@ pub(super) fn of(run: &ReplayRequest, topics: &[Topic], streams: &[Stream]) -> R
             put(key("aid"), aiding.name().to_owned());
         }
         put(key("clock"), prepared.clock.name().to_owned());
+        put(key("noise"), prepared.noise.name.clone());
         if let Some(words) = prepared.stamps.words(topic.resolved.kind) {
             put(key("stamps"), words);
         }

@@ -40,7 +40,6 @@ impl SigmaTerms {
     /// Makes them of a run as planned and prepared; `bridged` gaps were integrated across.
     #[must_use]
     pub fn of(plan: &Plan, prepared: &Prepared, bridged: u64) -> SigmaTerms {
-        let noise = &plan.noise;
         let mut terms = match &prepared.aiding {
             Some(aiding) => filtered(&aiding.settings),
             None => alone(plan, prepared.bias_sigma.into(), prepared.tilt_sigma),
@@ -54,7 +53,7 @@ impl SigmaTerms {
         });
         SigmaTerms {
             is_filtered: prepared.aiding.is_some(),
-            class: noise.name.clone(),
+            class: prepared.noise.name.clone(),
             terms,
         }
     }

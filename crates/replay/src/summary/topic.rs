@@ -161,11 +161,11 @@ impl TopicSummary {
             aided: estimator.filter().map(FilterSummary::of),
             smoothed,
             calibration: learned((plan, resolved, prepared), estimator.filter(), recording),
-            noise: plan.noise.name.clone(),
+            noise: prepared.noise.name.clone(),
             sigma_terms: recording
                 .is_none()
                 .then(|| SigmaTerms::of(plan, prepared, gaps.bridged)),
-            drift: drift(plan, prepared, propagation.integrated_secs),
+            drift: drift(prepared, propagation.integrated_secs),
             // Of what runs along with a smoother it would be another attitude's.
             integration_error: propagation
                 .integration_error
@@ -477,11 +477,11 @@ fn earth_text(latitude_deg: f64) -> String {
 
 /// Uncertainty of the bias after `secs`, about the worst axis, rad/s: what was not known at the start, and what it has
 /// wandered since.
-fn drift(plan: &Plan, prepared: &Prepared, secs: f64) -> f64 {
+fn drift(prepared: &Prepared, secs: f64) -> f64 {
     prepared
         .bias_sigma
         .iter()
-        .zip(plan.noise.rrw)
+        .zip(prepared.noise.rrw)
         .map(|(bias, rrw)| bias.hypot(rrw * secs.sqrt()))
         .fold(0.0, f64::max)
 }

@@ -4,7 +4,7 @@ use super::{Default, Row, Takes, Word};
 use crate::condition::{Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES};
 use crate::diagnostic::Diagnostic;
 use crate::estimate::plan::{
-    Aid, Bias, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise, Plan, Truncation,
+    Aid, Bias, CLASS_BY_DATA, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise, Plan, Truncation,
 };
 use crate::frames::BodyAxes;
 use crate::propagate::{Method, Order};
@@ -366,11 +366,12 @@ pub static ROWS: [Row; 29] = [
     },
     Row {
         setting: NOISE,
-        meaning: "Class of the sensor: consumer, uncalibrated, industrial, tactical, navigation, or a list",
-        effect: "It says how sure the attitude is (sigma), and what the filter expects of the sensor. A list is in the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw (deg/h/sqrt(h)), turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed ({bias}); initial is the uncertainty of the initial attitude. And one number each: scale-ppm and misalignment (deg), which grow with the angle of rotation, tilt (deg) of {init} gravity.",
-        default: Default::Value("consumer"),
+        meaning: "Class of the sensor: auto, consumer, uncalibrated, industrial, tactical, navigation, or a list",
+        effect: "It says how sure the attitude is (sigma), and what the filter expects of the sensor. auto is consumer; of a file whose attitude gravity corrects, uncalibrated where its data clearly tell that nobody calibrated the sensor. A list is in the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw (deg/h/sqrt(h)), turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed ({bias}); initial is the uncertainty of the initial attitude. And one number each: scale-ppm and misalignment (deg), which grow with the angle of rotation, tilt (deg) of {init} gravity.",
+        default: Default::Value(CLASS_BY_DATA),
         placeholder: "NOISE",
         words: &[
+            word(CLASS_BY_DATA, "By the data of a file, else consumer", |p| p.noise = Noise::by_data()),
             word(NOISE_PRESETS[0].name, "A chip of consumer electronics, calibrated by its maker", |p| p.noise = Noise::preset(&NOISE_PRESETS[0])),
             word(NOISE_PRESETS[1].name, "A cheap chip on a board that nobody has measured", |p| p.noise = Noise::preset(&NOISE_PRESETS[1])),
             word(NOISE_PRESETS[2].name, "A calibrated module, 2 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[2])),

@@ -1,0 +1,314 @@
+//! The first samples of a file -> whether its sensor is one that nobody calibrated. Pure.
+//!
+//! Apart from the preparation because it is an estimate of its own: a filter with wide priors runs over the samples
+//! first, and what it finds of scale, axes and accelerometer is weighed under both classes.
+
+use super::aiding::Aiding;
+use super::meaning::{Meaning, STANDARD_GRAVITY};
+use super::plan::{Aid, NOISE_PRESETS, Noise, Plan};
+use crate::aid::{Aided, Calibration, Settings};
+use crate::condition::{self, Clock, Conditioner};
+use crate::diagnostic::Diagnostic;
+use crate::digits::significant;
+use crate::frames::{Body, In, Nav};
+use crate::propagate::{self, Method, Order, Placement};
+use crate::quaternion::{BodyRate, Quaternion};
+use crate::record::{AttitudeSample, Nanos, RawSample, Status};
+use crate::setting::NOISE;
+use nalgebra::Vector3;
+
+/// Samples that are looked at: three minutes at 1 kHz.
+const MOST: usize = 200_000;
+/// The class of a sensor that nobody calibrated.
+const WIDE: &str = "uncalibrated";
+/// Logarithm of how many times likelier a sensor must be of that class to be taken for one. Calibrated ones had -1.6 to
+/// -15 on the 14 recordings of BROAD, and 4.5 at most in simulations: on a circle, whose steady acceleration looks like
+/// an accelerometer's bias.
+const CLEAR: f64 = 5.0;
+/// Integrates well enough to find a class, with a short window.
+const METHOD: Method = Method::Magnus {
+    window: 3,
+    order: Order::M4,
+    placement: Placement::Causal,
+};
+/// Sigmas of the length of a specific force at rest less standard gravity, m/s^2: of a calibrated accelerometer,
+/// gravity's own differences over the Earth included, and what is added to it where nobody calibrated.
+const CALIBRATED: f64 = 0.04;
+const UNCALIBRATED: f64 = 0.2;
+
+/// A sample, as far as it is kept.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    header: Option<Nanos>,
+    log: Nanos,
+    gyro: Option<[f64; 3]>,
+    accel: Option<[f64; 3]>,
+    interval: Option<i64>,
+}
+
+/// Decisions of the run, but for the class.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) resolved: &'a Meaning,
+    pub(super) clock: Clock,
+    pub(super) bias: BodyRate,
+    pub(super) initial: Quaternion<Nav, Body>,
+    pub(super) world_rate: In<Nav>,
+    pub(super) truncation_step: Option<f64>,
+    pub(super) aiding: Aiding,
+}
+
+/// Samples kept until they can be weighed.
+#[derive(Debug, Default)]
+pub(super) struct ClassPass(Vec<Kept>);
+
+/// Evidence that a sensor is one that nobody calibrated.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Evidence {
+    /// Logarithm of how many times likelier it is.
+    log: f64,
+    found: Calibration,
+    /// Length of the specific force at rest less gravity, m/s^2, where the body rested: the one farthest off.
+    off_at_rest: Option<f64>,
+}
+
+impl ClassPass {
+    /// Makes one where the class is to be found.
+    pub(super) fn of(plan: &Plan) -> Option<ClassPass> {
+        let is_open = plan.noise.is_by_data() && plan.calibration.is_none();
+        (is_open && plan.aid != Aid::None).then(ClassPass::default)
+    }
+
+    /// Takes the next sample.
+    pub(super) fn take(&mut self, raw: &RawSample) {
+        if self.wants_more() {
+            self.0.push(Kept {
+                header: raw.header,
+                log: raw.log,
+                gyro: raw.gyro,
+                accel: raw.accel,
+                interval: raw.interval_nanos,
+            });
+        }
+    }
+
+    /// Whether more samples would tell more.
+    pub(super) fn wants_more(&self) -> bool {
+        self.0.len() < MOST
+    }
+
+    /// The class `uncalibrated`, what corrects the attitude with its priors, and why it is taken, where that is clear.
+    pub(super) fn told(self, run: &Run<'_>) -> Option<(Noise, Aiding, Diagnostic)> {
+        let noise = Noise::named(WIDE)?;
+        let plan = Plan {
+            noise: noise.clone(),
+            ..run.plan.clone()
+        };
+        let aiding = run.aiding.of_class(&plan, run.resolved);
+        let evidence = self.weigh(run, &aiding)?;
+        (evidence.log > CLEAR).then(|| (noise, aiding, evidence.said()))
+    }
+
+    /// Weighs the samples by a filter of the wide class.
+    fn weigh(self, run: &Run<'_>, wide: &Aiding) -> Option<Evidence> {
+        let conditioning = run.resolved.conditioning(run.plan, run.clock, run.bias);
+        let conditioning = condition::Settings {
+            accel_scale: conditioning.accel_scale * wide.force_scale,
+            truncation_step: run.truncation_step,
+            ..conditioning
+        };
+        let propagation = propagate::Settings {
+            method: METHOD,
+            kind: run.resolved.kind,
+            initial: run.initial,
+            world_rate: run.world_rate,
+            ..propagate::Settings::default()
+        };
+        let mut conditioner = Conditioner::new(&conditioning).ok()?;
+        let settings = Settings {
+            has_field: false,
+            hard_iron: 0.0,
+            ..wide.settings
+        };
+        let mut aided = Aided::new(propagation, settings, wide.start).ok()?;
+        let (mut rests, mut rates, mut attitudes) = (Rests::default(), Vec::new(), Vec::new());
+        for kept in &self.0 {
+            conditioner.push(std::slice::from_ref(&kept.raw()), &mut rates);
+            aided.push(&rates, &mut attitudes);
+            rates.clear();
+            rests.take(&attitudes);
+            attitudes.clear();
+        }
+        conditioner.finish(&mut rates);
+        aided.push(&rates, &mut attitudes);
+        aided.finish(&mut attitudes);
+        rests.take(&attitudes);
+        let filter = aided.filter();
+        let off_at_rest = rests.farthest();
+        let by_motion = filter.likelier_than(&run.aiding.settings);
+        Some(Evidence {
+            log: by_motion + off_at_rest.map_or(0.0, by_length),
+            found: *filter.calibration(),
+            off_at_rest,
+        })
+    }
+}
+
+impl Kept {
+    fn raw(&self) -> RawSample {
+        RawSample {
+            header: self.header,
+            log: self.log,
+            publish: self.log,
+            gyro: self.gyro,
+            accel: self.accel,
+            interval_nanos: self.interval,
+            ..RawSample::default()
+        }
+    }
+}
+
+impl Evidence {
+    fn said(&self) -> Diagnostic {
+        let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
+        let mut what = format!(
+            "taken for a sensor that nobody calibrated (class {WIDE}): by these data that is e^{:.0} times likelier (scale {} %, axes {} deg, accelerometer {} m/s^2",
+            self.log,
+            largest(&self.found.scale, 100.0),
+            largest(&self.found.cross, 1f64.to_degrees()),
+            largest(&self.found.force_bias, 1.0),
+        );
+        if let Some(off) = self.off_at_rest {
+            what += &format!(", {} m/s^2 off gravity at rest", significant(off, 2));
+        }
+        let class = NOISE.to(NOISE_PRESETS[0].name);
+        Diagnostic::new(what + ")")
+            .help(format!(
+                "{class} keeps the priors of one that its maker calibrated"
+            ))
+            .coded("class-by-data")
+    }
+}
+
+/// Evidence of the length of a specific force at rest.
+fn by_length(off: f64) -> f64 {
+    let narrow = CALIBRATED * CALIBRATED;
+    let wide = narrow + UNCALIBRATED * UNCALIBRATED;
+    0.5 * ((narrow / wide).ln() + off * off * (1.0 / narrow - 1.0 / wide))
+}
+
+/// Specific forces at rest.
+#[derive(Default)]
+struct Rests {
+    sum: Vector3<f64>,
+    count: f64,
+    farthest: Option<f64>,
+}
+
+impl Rests {
+    fn take(&mut self, attitudes: &[AttitudeSample]) {
+        for attitude in attitudes {
+            match attitude.accel.filter(|_| attitude.status.has(Status::REST)) {
+                Some(force) => {
+                    self.sum += force.as_vector();
+                    self.count += 1.0;
+                }
+                None if !attitude.status.has(Status::REST) => self.end(),
+                None => {}
+            }
+        }
+    }
+
+    /// Ends a rest.
+    fn end(&mut self) {
+        if self.count > 0.0 {
+            let off = (self.sum / self.count).norm() - STANDARD_GRAVITY;
+            if self.farthest.is_none_or(|other| off.abs() > other.abs()) {
+                self.farthest = Some(off);
+            }
+        }
+        (self.sum, self.count) = (Vector3::zeros(), 0.0);
+    }
+
+    fn farthest(mut self) -> Option<f64> {
+        self.end();
+        self.farthest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::estimate::{Patience, Preparation, Prepared};
+    use crate::quaternion::RotationVector;
+    use crate::record::Declared;
+
+    /// A body that rests for 5 s and is then turned every way for 35, with a gyro whose scale is off by `scale` and an
+    /// accelerometer that is off by `force`.
+    fn prepared(noise: Noise, scale: f64, force: Vector3<f64>) -> Prepared {
+        let plan = Plan {
+            aid: Aid::Gravity,
+            noise,
+            ..Plan::default()
+        };
+        let meaning = Meaning::new(&plan, &Declared::default());
+        let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);
+        let mut attitude = Quaternion::<Nav, Body>::identity();
+        for k in 0..4000 {
+            let t = f64::from(k) * 0.01;
+            let rate = if k < 500 {
+                Vector3::zeros()
+            } else {
+                Vector3::new((1.1 * t).sin(), (0.7 * t).cos(), (1.7 * t).sin())
+            };
+            attitude = attitude.advanced(&RotationVector(rate * 0.01));
+            let up = attitude.to_dcm().as_matrix().row(2).transpose();
+            let sample = RawSample {
+                header: Some(Nanos(i64::from(k) * 10_000_000)),
+                gyro: Some((rate * (1.0 + scale)).into()),
+                accel: Some((up * STANDARD_GRAVITY + force).into()),
+                ..RawSample::default()
+            };
+            preparation.take(&sample).unwrap();
+        }
+        preparation.decide().unwrap()
+    }
+
+    fn codes(prepared: &Prepared) -> Vec<&str> {
+        prepared
+            .warnings
+            .iter()
+            .filter_map(Diagnostic::code)
+            .collect()
+    }
+
+    #[test]
+    fn a_sensor_that_nobody_calibrated_is_taken_for_one_and_that_is_said() {
+        let off = Vector3::new(0.2, -0.15, 0.1);
+        let found = prepared(Noise::by_data(), 0.015, off);
+        assert_eq!(found.noise.name, WIDE);
+        assert_eq!(codes(&found), ["class-by-data"]);
+        assert!((found.aiding.unwrap().settings.scale_prior - 0.01).abs() < 1e-12);
+        // Who states a class is believed.
+        let stated = prepared(Noise::preset(&NOISE_PRESETS[0]), 0.015, off);
+        assert_eq!(stated.noise.name, NOISE_PRESETS[0].name);
+        assert!(codes(&stated).is_empty());
+    }
+
+    #[test]
+    fn a_calibrated_sensor_is_not() {
+        for scale in [0.0, 0.004, -0.004] {
+            let found = prepared(Noise::by_data(), scale, Vector3::new(0.02, 0.0, -0.02));
+            assert_eq!(found.noise.name, NOISE_PRESETS[0].name, "{scale}");
+            assert!(codes(&found).is_empty());
+        }
+    }
+
+    #[test]
+    fn the_length_at_rest_tells_an_accelerometer() {
+        assert!(by_length(0.0) < 0.0 && by_length(0.05) < 0.0);
+        assert!(by_length(0.2) > CLEAR);
+    }
+}
