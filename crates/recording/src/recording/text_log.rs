@@ -302,3 +302,61 @@ fn surveyed((known, times): &(LogChannel, Option<(u64, u64)>)) -> ChannelSurvey 
         bytes: None,
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::decoders::Decoders;
+    use super::super::sample_cache::MOST;
+    use super::*;
+    use crate::recording::warn::Warn;
+
+    /// Items of two walks, as text.
+    fn walked(text: &str, kept: u64) -> (bool, [String; 2]) {
+        let mut file = tempfile::Builder::new()
+            .suffix(".ndjson")
+            .tempfile()
+            .unwrap();
+        std::io::Write::write_all(&mut file, text.as_bytes()).unwrap();
+        let warn = Warn::by(|_| {});
+        let input = Input::open(file.path(), &warn).unwrap();
+        let (log, channels) = TextLog::survey(&input, &Options::default(), kept).unwrap();
+        let walk = || {
+            let mut all = String::new();
+            let route = |channel: &Arc<Channel>| {
+                let known = channels.get(channel.index)?;
+                let decoder = known.decoder(&mut Decoders::default()).ok()?;
+                Some(Route::samples(decoder, channel.index))
+            };
+            let walked = log.walk::<Error>(route, |items| {
+                all.push_str(&format!("{} items: {items:?}\n", items.len()));
+                Ok(ControlFlow::Continue(()))
+            });
+            walked.unwrap();
+            all
+        };
+        (log.cache.is_some(), [walk(), walk()])
+    }
+
+    #[test]
+    fn a_text_that_is_kept_is_walked_as_one_that_is_read_again() {
+        let lines = (0..3000).map(|n| match n % 10 {
+            3 => "{ no line\n".to_owned(),
+            5 => format!("{{\"id\":\"a\",\"stamp_ms\":{n},\"accel\":[0,0,9.8]}}\n"),
+            k => {
+                let (id, stamp) = (if k < 5 { "a" } else { "b" }, 1_700_000_000_000i64 + n);
+                format!("{{\"id\":\"{id}\",\"stamp\":{stamp},\"gyro\":[0.1,{n},-0.0]}}\n")
+            }
+        });
+        let text: String = lines.collect();
+        let (is_kept, kept) = walked(&text, MOST);
+        let (is_too_long, read) = walked(&text, 1000);
+        assert!(is_kept && !is_too_long);
+        assert!(kept[0] == read[0] && kept[1] == kept[0] && read[1] == read[0]);
+        let (samples, lost) = (
+            kept[0].matches("Sample(").count(),
+            kept[0].matches("Undecodable(").count(),
+        );
+        assert_eq!((samples, lost), (2700, 300));
+    }
+}
