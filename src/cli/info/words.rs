@@ -196,7 +196,7 @@ fn write_topic(looked: &Inspection, out: &mut String) {
     }
 }
 
-/// What the orientations are, and what a sample is taken for.
+/// Writes how the orientations are, and as which kind a sample is taken.
 fn write_meaning(looked: &Inspection, out: &mut String) {
     let q = &looked.quality;
     let _ = writeln!(
@@ -218,7 +218,7 @@ fn write_meaning(looked: &Inspection, out: &mut String) {
     );
 }
 
-/// The first rest, and the bias that it tells.
+/// Writes the first rest and the bias that it tells.
 fn write_rest(looked: &Inspection, out: &mut String) {
     match (&looked.bias, looked.rests.kept.first(), looked.rests.first) {
         (Some(bias), Some(rest), Some(first)) => {

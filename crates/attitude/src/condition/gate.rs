@@ -3,8 +3,6 @@
 //! A stage of its own because it looks at one sample alone: what comes behind it compares
 //! samples with each other and may rely on every number being finite and every stamp subtractable.
 
-#[cfg(feature = "serde")]
-use super::memory;
 use super::settings::Settings;
 use super::truncation::undone;
 use crate::record::{Nanos, RawSample, SampleKind, Status, Verdict};
@@ -20,12 +18,15 @@ const MAX_INTERVAL_NANOS: i64 = 10_000_000_000;
 /// can be subtracted without overflow.
 pub(super) const MAX_STAMP: i64 = i64::MAX / 2;
 
+/// Stamp, log time, value, specific force, interval (0: none), epoch, status bits, as they are saved.
+pub(super) type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
+
 /// A sample that passed the gate; its stamp may still be out of order.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
-    serde(from = "memory::Row", into = "memory::Row")
+    serde(from = "Row", into = "Row")
 )]
 pub(super) struct Entry {
     pub(super) stamp: Nanos,

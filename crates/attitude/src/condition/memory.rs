@@ -4,9 +4,9 @@
 //! unseen. Samples that have left are not kept: whoever sends them again is told by the stamps.
 
 use super::clock::IndexClock;
-use super::gate::{Entry, HUGE_RATE, MAX_STAMP, NO_ACCEL, finite_accel};
+use super::gate::{Entry, HUGE_RATE, MAX_STAMP, NO_ACCEL, Row, finite_accel};
 use super::spacing::Steps;
-use super::timing::Previous;
+use super::timing::{Before, Previous};
 use super::{Conditioner, Report, State, order};
 use crate::plausible::are_numbers;
 use crate::record::{Nanos, RawSample, Status, Verdict};
@@ -36,12 +36,6 @@ pub struct Memory {
     first: Option<Nanos>,
     last: Option<Nanos>,
 }
-
-/// Stamp, start, value, epoch.
-pub(super) type Before = (i64, i64, [f64; 3], u32);
-
-/// Stamp, log time, value, specific force, interval (0: none), epoch, status bits.
-pub(super) type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
 
 impl Memory {
     /// Whether a conditioner can have known it, whatever the settings.

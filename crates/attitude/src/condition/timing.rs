@@ -4,8 +4,6 @@
 //! interval, says whether something before it is missing, and never shares its instant.
 
 use super::gate::{Entry, finite_accel};
-#[cfg(feature = "serde")]
-use super::memory;
 use super::report::{Gap, Report};
 use super::settings::{OnGap, Settings};
 use super::spacing::{Spacing, Steps};
@@ -26,12 +24,15 @@ const COARSE: usize = 3;
 /// steps that are surely full.
 const COARSE_STAMPS: usize = 4;
 
+/// Stamp, start, value, epoch, as they are saved.
+pub(super) type Before = (i64, i64, [f64; 3], u32);
+
 /// The sample before.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
-    serde(from = "memory::Before", into = "memory::Before")
+    serde(from = "Before", into = "Before")
 )]
 pub(super) struct Previous {
     pub(super) stamp: Nanos,

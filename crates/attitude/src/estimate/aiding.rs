@@ -5,7 +5,6 @@
 
 use super::meaning::{Meaning, STANDARD_GRAVITY};
 use super::plan::{Aid, Initial, NOISE_PRESETS, Noise, Plan};
-use super::preparation::Prepared;
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
@@ -279,8 +278,8 @@ fn no_gravity(length: f64) -> String {
 impl Aiding {
     /// One standard deviation of what is left of a bias that was said, measured at rest or calibrated, rad/s, body
     /// axes.
-    pub(super) fn stated_bias(&self, prepared: &Prepared) -> [Option<f64>; 3] {
-        let left = prepared.bias_left.map(|_| self.settings.bias_prior);
+    pub(super) fn stated_bias(&self, is_removed: bool) -> [Option<f64>; 3] {
+        let left = is_removed.then_some(self.settings.bias_prior);
         match self.settings.prior.bias {
             Some(known) => known
                 .diagonal()

@@ -198,7 +198,7 @@ impl Estimator {
                         bias_sigma: prepared.noise.bias_of_class(),
                         gyro_range: aiding.settings.gyro_range,
                         known: Beforehand {
-                            gyro_bias: aiding.stated_bias(prepared),
+                            gyro_bias: aiding.stated_bias(prepared.bias_left.is_some()),
                             ..resolved.beforehand()
                         },
                     };

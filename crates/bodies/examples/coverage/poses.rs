@@ -50,7 +50,7 @@ impl Draw {
     }
 }
 
-/// From 0 to 1 between two times.
+/// Share between two times, 0 before and 1 behind.
 fn ramp(t: f64, from: f64, to: f64) -> f64 {
     let x = ((t - from) / (to - from)).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
@@ -118,7 +118,7 @@ pub(crate) fn pose(body: &str, seed: u64) -> Option<Pose> {
             let stops = move |t: f64| {
                 under_way(t)
                     * (TAU * t / 15.0).sin().max(0.0).powi(2)
-                    * if (t / 15.0) as u64 % 2 == 0 {
+                    * if ((t / 15.0) as u64).is_multiple_of(2) {
                         1.0
                     } else {
                         -1.0

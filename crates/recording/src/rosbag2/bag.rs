@@ -276,7 +276,7 @@ fn is_of_topics(page: &Page<'_>) -> Option<i64> {
     is_topic.then_some(cell.rowid)
 }
 
-/// What the number of pages that there are says against the one that the header states.
+/// Fault of a file that has more or fewer pages than its header states.
 fn length_fault(said: Option<u32>, have: u32) -> Option<Fault> {
     match said {
         Some(need) if need > have => Some(Fault::at(have, FaultKind::Cut { need, have }, None)),

@@ -344,7 +344,7 @@ impl<'a> Compiler<'a> {
         Ok(())
     }
 
-    /// What a repetition at this path gives for a sample.
+    /// Rule by which a repetition at this path gives samples.
     fn emit(&self) -> Emit {
         match self.batch.filter(|batch| batch.path == self.path) {
             None => Emit::No,
