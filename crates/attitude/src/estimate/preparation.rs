@@ -3,6 +3,9 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it cannot be known.
 
+mod bias;
+
+use self::bias::{decide_bias, looks_for_bias, with_bias_of_rest};
 use super::aiding::Aiding;
 use super::class_pass::{self, ClassPass};
 use super::first_pass::{FEW, RestPass};
@@ -19,7 +22,7 @@ use crate::propagate::Method;
 use crate::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use crate::record::{Nanos, RawSample, SampleKind};
 use crate::setting::{
-    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT, REGULARISE_STAMPS, START,
+    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT, REGULARISE_STAMPS,
     UNDO_TRUNCATION,
 };
 use crate::worlds::{self, Convention, World};
@@ -447,28 +450,6 @@ fn needs_rest(plan: &Plan) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
 }
 
-/// Whether nobody has said the bias of a file that is aided, and a rest would tell it better than its class. With the
-/// Earth's rotation taken out it is the rest at the start alone that could, and on the way the filter learns as much.
-fn looks_for_bias(plan: &Plan, resolved: &Meaning, patience: Patience) -> bool {
-    plan.bias == Bias::Unsaid
-        && plan.aid != Aid::None
-        && patience == Patience::WholeLog
-        && !is_live(plan.method)
-        && plan.latitude_deg.is_none()
-        && resolved.calibrated_bias(&plan.noise).is_none()
-        && Bias::Auto.left() < Some(plan.noise.bias_of_class())
-}
-
-/// The plan with the bias of a file's rests, if they tell it, those that do, and what to say of the others.
-fn with_bias_of_rest(plan: Plan, rests: &Rests) -> (Plan, Rests, Option<Diagnostic>) {
-    let (rests, turn) = rests.less_turns(plan.noise.bias_of_class());
-    let bias = match stillness::estimate_bias(&rests, &Limits::default()) {
-        Ok(_) => Bias::Auto,
-        Err(_) => Bias::None,
-    };
-    (Plan { bias, ..plan }, rests, turn)
-}
-
 /// Whether the method waits for nothing, as a daemon.
 fn is_live(method: Method) -> bool {
     matches!(
@@ -551,56 +532,6 @@ fn decide_truncation(
                 )
             }
         }),
-    }
-}
-
-/// `earth` is what the gyro feels of the Earth's rotation at the initial attitude, rad/s, where that is
-/// taken out: then it is no bias, and only a rest at the start, where the attitude is known, can tell
-/// the two apart.
-fn decide_bias(
-    (plan, resolved): (&Plan, &Meaning),
-    rests: &Rests,
-    earth: Option<Vector3<f64>>,
-) -> Result<(BodyRate, Vector3<f64>, String), Diagnostic> {
-    match plan.bias {
-        Bias::Unsaid | Bias::None => Ok(match resolved.calibrated_bias(&plan.noise) {
-            Some((bias, sigma)) => (BodyRate(bias), sigma, "as calibrated".to_owned()),
-            None => (
-                BodyRate::ZERO,
-                plan.noise.unremoved_bias().into(),
-                "none".to_owned(),
-            ),
-        }),
-        Bias::Given(bias) => Ok((
-            bias,
-            plan.noise.unstable_bias().into(),
-            "as given".to_owned(),
-        )),
-        Bias::Auto => {
-            let limits = Limits::default();
-            let refuse = |e: NoRest| Diagnostic::from(&e).at(format_args!("{BIAS} auto"));
-            let mut estimate = stillness::estimate_bias(rests, &limits).map_err(refuse)?;
-            let mut earths = "";
-            if let Some(earth) = earth {
-                let first = stillness::rest_at_start(rests, &limits)
-                    .map_err(|e| not_at_start(&e))?
-                    .alone();
-                estimate = stillness::estimate_bias(&first, &limits).map_err(refuse)?;
-                estimate.bias.0 -= earth;
-                earths = " at the start, less the Earth's rate";
-            }
-            let sigma = estimate.sigma.max();
-            // Known to the estimate's sigma at rest, and not stable since.
-            let instability = Vector3::from(plan.noise.unstable_bias());
-            Ok((
-                estimate.bias,
-                estimate.sigma.zip_map(&instability, f64::hypot),
-                format!(
-                    "from {:.1} s of rest{earths}, +- {sigma:.1e} rad/s",
-                    estimate.secs
-                ),
-            ))
-        }
     }
 }
 
@@ -741,18 +672,6 @@ impl Earth {
             ))
         )
     }
-}
-
-/// Why `--bias auto` with `--earth-rate` cannot be.
-fn not_at_start(why: &NoRest) -> Diagnostic {
-    let why = Diagnostic::from(why);
-    let why = why.what();
-    Diagnostic::new(format!(
-        "{BIAS} auto with {EARTH_RATE}: {why}; only at the start is the attitude known, and without it a bias and the Earth's rotation are the same"
-    ))
-    .help(format!(
-        "{START} SECS begins at a rest, {BIAS} x,y,z (rad/s) gives the bias"
-    ))
 }
 
 /// Why `--init gravity` cannot be. The reasons are those of a bias, the ways out are not.
