@@ -59,6 +59,10 @@ fn every_row_is_in_the_help_of_every_estimation_and_in_its_file() {
             line.starts_with(&format!("{key} "))
         });
         let line = line.unwrap_or_else(|| panic!("{key}: {shown}"));
+        // Tests run with some of them.
+        if row.environment.is_some() && line.ends_with("# environment") {
+            continue;
+        }
         match (row.default, row.takes) {
             (_, Takes::Switch(_)) => assert!(line.contains("= false")),
             // Of a stream that is another.

@@ -80,18 +80,24 @@ fn neither_threads_nor_a_pipe_change_a_byte() {
     std::fs::write(dir.join("hand.ndjson"), &lines).unwrap();
     let one = strapd(
         dir,
-        "replay hand.ndjson --aid gravity --smooth --threads 1 -o - -q",
+        "replay hand.ndjson --aid gravity --bias none --smooth --threads 1 -o - -q",
     );
     let rates = lines.lines().filter(|line| line.contains("\"gyro\""));
     assert_eq!(one.done().lines().len(), rates.count());
     for threads in [2, 4] {
         let other = strapd(
             dir,
-            &format!("replay hand.ndjson --aid gravity --smooth --threads {threads} -o - -q"),
+            &format!(
+                "replay hand.ndjson --aid gravity --bias none --smooth --threads {threads} -o - -q"
+            ),
         );
         assert!(one.out == other.done().out, "{threads} threads");
     }
-    let piped = strapd_fed(dir, "replay - --aid gravity --smooth -o - -q", lines);
+    let piped = strapd_fed(
+        dir,
+        "replay - --aid gravity --bias none --smooth -o - -q",
+        lines,
+    );
     assert!(one.out == piped.done().out, "a pipe");
 }
 

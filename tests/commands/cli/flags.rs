@@ -10,7 +10,7 @@ fn a_flag_that_can_not_be_is_refused_by_name_before_anything_is_read() {
         ("--method foo", &["--method", "foo", "auto", "dcm-left"]),
         ("--method magnus --window 40", &["--window", "24"]),
         ("--method magnus --window 0", &["--window"]),
-        ("--method magnus --order 3", &["--order", "`3`"]),
+        ("--method magnus --order 3", &["--order", "'3'"]),
         ("--method dcm-left --window 4", &["--window", "dcm-left"]),
         ("--window four", &["--window", "four"]),
         (

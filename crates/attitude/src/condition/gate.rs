@@ -18,9 +18,6 @@ const MAX_INTERVAL_NANOS: i64 = 10_000_000_000;
 /// can be subtracted without overflow.
 pub(super) const MAX_STAMP: i64 = i64::MAX / 2;
 
-/// Stamp, log time, value, specific force, interval (0: none), epoch, status bits, as they are saved.
-pub(super) type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
-
 /// A sample that passed the gate; its stamp may still be out of order.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(
@@ -42,6 +39,45 @@ pub(super) struct Entry {
     /// Stretch of the stream between two jumps back of the clock.
     pub(super) epoch: u32,
     pub(super) status: Status,
+}
+
+/// An entry as it is saved: stamp, log time, value, specific force, interval (0: none), epoch, status bits.
+type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
+
+impl From<Entry> for Row {
+    fn from(entry: Entry) -> Row {
+        (
+            entry.stamp.0,
+            entry.log.0,
+            entry.value.into(),
+            finite_accel(&entry.accel).map(Into::into),
+            entry.interval,
+            entry.epoch,
+            entry.status.0,
+        )
+    }
+}
+
+/// The same measurement as far as it is saved, with or without a specific force.
+impl PartialEq for Entry {
+    fn eq(&self, other: &Entry) -> bool {
+        Row::from(*self) == Row::from(*other)
+    }
+}
+
+impl From<Row> for Entry {
+    fn from((stamp, log, value, accel, interval, epoch, status): Row) -> Entry {
+        Entry {
+            stamp: Nanos(stamp),
+            log: Nanos(log),
+            value: Vector3::from(value),
+            accel: accel.map_or(NO_ACCEL, Vector3::from),
+            interval: interval.max(0),
+            index: 0,
+            epoch,
+            status: Status(status),
+        }
+    }
 }
 
 impl Entry {

@@ -24,9 +24,6 @@ const COARSE: usize = 3;
 /// steps that are surely full.
 const COARSE_STAMPS: usize = 4;
 
-/// Stamp, start, value, epoch, as they are saved.
-pub(super) type Before = (i64, i64, [f64; 3], u32);
-
 /// The sample before.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(
@@ -39,6 +36,35 @@ pub(super) struct Previous {
     pub(super) start: Nanos,
     pub(super) value: Vector3<f64>,
     pub(super) epoch: u32,
+}
+
+/// The sample before as it is saved: stamp, start, value, epoch.
+#[cfg(feature = "serde")]
+type Before = (i64, i64, [f64; 3], u32);
+
+#[cfg(feature = "serde")]
+impl From<Previous> for Before {
+    fn from(previous: Previous) -> Before {
+        let Previous {
+            stamp,
+            start,
+            value,
+            epoch,
+        } = previous;
+        (stamp.0, start.0, value.into(), epoch)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Before> for Previous {
+    fn from((stamp, start, value, epoch): Before) -> Previous {
+        Previous {
+            stamp: Nanos(stamp),
+            start: Nanos(start),
+            value: Vector3::from(value),
+            epoch,
+        }
+    }
 }
 
 /// Gives every entry its interval and its join.

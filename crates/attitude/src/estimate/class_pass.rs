@@ -76,7 +76,8 @@ struct Evidence {
 impl ClassPass {
     /// Makes one where the class is to be found.
     pub(super) fn of(plan: &Plan) -> Option<ClassPass> {
-        let is_open = plan.noise.is_by_data() && plan.calibration.is_none();
+        // A smoother finds what is wrong of a sensor by itself, and its heading is worse with wide priors.
+        let is_open = plan.noise.is_by_data() && plan.calibration.is_none() && !plan.smooth;
         (is_open && plan.aid != Aid::None).then(ClassPass::default)
     }
 
@@ -107,7 +108,8 @@ impl ClassPass {
         };
         let aiding = run.aiding.of_class(&plan, run.resolved);
         let evidence = self.weigh(run, &aiding)?;
-        (evidence.log > CLEAR).then(|| (noise, aiding, evidence.said()))
+        let is_clear = evidence.log > CLEAR && evidence.is_within(&aiding.settings);
+        is_clear.then(|| (noise, aiding, evidence.said()))
     }
 
     /// Weighs the samples by a filter of the wide class.
@@ -170,6 +172,20 @@ impl Kept {
 }
 
 impl Evidence {
+    /// Whether what was found is what units of the class have, three sigmas: what is farther off is the motion's, or that
+    /// of another fault, and no class explains it.
+    fn is_within(&self, class: &Settings) -> bool {
+        let Calibration {
+            scale,
+            cross,
+            force_bias,
+            ..
+        } = &self.found;
+        scale.amax() < 3.0 * class.scale_prior
+            && cross.amax() < 3.0 * class.cross_prior
+            && force_bias.amax() < 3.0 * class.force_bias_prior
+    }
+
     fn said(&self) -> Diagnostic {
         let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
         let mut what = format!(

@@ -6,7 +6,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::settings::{
     Default, ROWS, Row, Takes, Value, defaults, named, row, with,
 };
-use strapd_attitude::estimate::{Aid, NOISE_PRESETS, Plan, SensorCalibration};
+use strapd_attitude::estimate::{Aid, CLASS_BY_DATA, NOISE_PRESETS, Plan, SensorCalibration};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::setting;
@@ -121,7 +121,9 @@ fn words_are_the_names_of_what_they_set_and_none_is_left_out() {
     for class in &NOISE_PRESETS {
         assert_eq!(plan("noise", class.name).noise.name, class.name);
     }
-    assert_eq!(words("noise").count(), NOISE_PRESETS.len());
+    // The last is told by the data.
+    assert_eq!(words("noise").count(), NOISE_PRESETS.len() + 1);
+    assert_eq!(plan("noise", CLASS_BY_DATA).noise, Plan::default().noise);
     assert_eq!(plan("aid", "gravity+mag").aid, Aid::GravityAndField);
 }
 

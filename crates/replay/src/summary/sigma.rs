@@ -308,7 +308,10 @@ mod tests {
 
     #[test]
     fn what_bias_and_init_leave_is_said_and_what_is_nothing_is_not() {
-        let plan = Plan::default();
+        let plan = Plan {
+            noise: Noise::named("consumer").unwrap(),
+            ..Plan::default()
+        };
         let said = words(&plan);
         assert!(said.contains("class consumer, noise"), "{said}");
         assert!(
