@@ -175,9 +175,10 @@ fn the_files_of_a_phone_are_one_recording_with_the_bits_of_its_lines() {
         );
     }
     // What `cat` prints is the recording, too.
-    let (rows, _) = replayed(at, "phone", "--aid auto");
+    let flags = "--aid auto --bias none --noise consumer";
+    let (rows, _) = replayed(at, "phone", flags);
     let cat = strapd(at, "cat phone").out;
-    strapd_fed(at, "replay - -o out.csv --force --aid auto", cat).done();
+    strapd_fed(at, &format!("replay - -o out.csv --force {flags}"), cat).done();
     assert!(std::fs::read_to_string(at.join("out.csv")).unwrap() == rows);
     // Without the force the same rates drift.
     replayed(at, "phone/Gyroscope.csv", "").1.done();

@@ -521,7 +521,11 @@ fn a_wheeled_robot_keeps_the_heading_of_its_gyro_under_a_sigma_that_is_true() {
     let dir = tempfile::tempdir().unwrap();
     let log = shared_data::shared("logs/real/husky_ros1_lz4.mcap").unwrap();
     let log = log.display();
-    strapd(dir.path(), &format!("replay {log} -o husky.mcap")).done();
+    strapd(
+        dir.path(),
+        &format!("replay {log} --aid auto -o husky.mcap"),
+    )
+    .done();
     let compare = format!("compare husky.mcap {log} --align first-heading --json");
     let compared = strapd(dir.path(), &compare).json();
     let most = compared["heading"]["max_deg"].as_f64().unwrap();
