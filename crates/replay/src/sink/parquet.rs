@@ -173,7 +173,7 @@ impl Table {
     fn pack(&mut self, out: &mut Vec<u8>) -> Result<()> {
         let writer = match &mut self.writer {
             Some(writer) => writer,
-            empty => empty.insert(begin(&self.columns, std::mem::take(&mut self.about))?),
+            empty => empty.insert(begin_file(&self.columns, std::mem::take(&mut self.about))?),
         };
         if self.waiting > 0 {
             let mut group = writer.next_row_group()?;
@@ -193,7 +193,7 @@ impl Table {
     }
 }
 
-fn begin(columns: &[Column], about: Vec<KeyValue>) -> Result<SerializedFileWriter<Vec<u8>>> {
+fn begin_file(columns: &[Column], about: Vec<KeyValue>) -> Result<SerializedFileWriter<Vec<u8>>> {
     let clock = match columns.first().and_then(Column::first_whole) {
         Some(Y2000_NANOS..) => Clock::Unix,
         _ => Clock::Own,
