@@ -16,7 +16,7 @@ use strapd_attitude::setting::FIELD;
 
 impl Decoder {
     /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
-    /// that is a bare number, by the recorder's clock and else by its magnitude (until [`Decoder::settle_unit`] has
+    /// that is a bare number, by the recorder's clock and else by its magnitude (until `Decoder::settle_unit` has
     /// seen more), and for JSON what the messages hold. Without this call such stamps are read by magnitude,
     /// one by one.
     ///
@@ -35,7 +35,7 @@ impl Decoder {
     }
 
     /// Whether stamps are bare numbers, whose unit the first messages are to tell
-    /// ([`Decoder::settle_unit`]). Of JSON: whether they may be.
+    /// (`Decoder::settle_unit`). Of JSON: whether they may be.
     #[must_use]
     pub fn has_bare_stamps(&self) -> bool {
         self.has_bare_stamps
