@@ -94,8 +94,9 @@ impl Rest {
         self.swing = Swing::default();
     }
 
-    /// Takes the mean rate over an interval, and what of it is not known to be bias. Returns what the gyro reads at rest, once the body has rested on for long
-    /// enough since: the mean of the whole spell the first time, then of one interval each.
+    /// Takes the mean rate over an interval, and what of it is not known to be bias. Returns what the gyro reads at rest,
+    /// once the body has rested on for long enough since: the mean of the whole spell the first time, then of one interval
+    /// each.
     pub(super) fn take_interval(
         &mut self,
         (mean, off): (Vector3<f64>, Vector3<f64>),

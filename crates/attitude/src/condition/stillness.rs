@@ -15,7 +15,7 @@ mod turns;
 pub(crate) use estimate::rest_at_start;
 pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level};
 pub(crate) use swing::Swing;
-pub(crate) use turns::{ALONG, BEYOND_CLASS, about_vertical};
+pub(crate) use turns::{ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical};
 
 use crate::frames::{Body, In};
 use crate::quaternion::BodyRate;

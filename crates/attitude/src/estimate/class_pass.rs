@@ -4,8 +4,9 @@
 //! first, and what it finds of scale, axes and accelerometer is weighed under both classes.
 
 use super::aiding::Aiding;
+use super::first_pass::MANY;
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, NOISE_PRESETS, Noise, Plan};
+use super::plan::{Aid, NOISE_PRESETS, Noise, NoisePreset, Plan};
 use crate::aid::{Aided, Calibration, Settings};
 use crate::condition::{self, Clock, Conditioner};
 use crate::diagnostic::Diagnostic;
@@ -17,10 +18,8 @@ use crate::record::{AttitudeSample, Nanos, RawSample, Status};
 use crate::setting::NOISE;
 use nalgebra::Vector3;
 
-/// Samples that are looked at: three minutes at 1 kHz.
-const MOST: usize = 200_000;
 /// The class of a sensor that nobody calibrated.
-const WIDE: &str = "uncalibrated";
+const WIDE: &NoisePreset = &NOISE_PRESETS[1];
 /// Logarithm of how many times likelier a sensor must be of that class to be taken for one. Calibrated ones had -1.6 to
 /// -15 on the 14 recordings of BROAD, and 4.5 at most in simulations: on a circle, whose steady acceleration looks like
 /// an accelerometer's bias.
@@ -76,7 +75,7 @@ struct Evidence {
 impl ClassPass {
     /// Makes one where the class is to be found.
     pub(super) fn of(plan: &Plan) -> Option<ClassPass> {
-        // A smoother finds what is wrong of a sensor by itself, and its heading is worse with wide priors.
+        // A smoother widens its priors by itself: in six hands its errors are the same, class stated or not.
         let is_open = plan.noise.is_by_data() && plan.calibration.is_none() && !plan.smooth;
         (is_open && plan.aid != Aid::None).then(ClassPass::default)
     }
@@ -96,12 +95,12 @@ impl ClassPass {
 
     /// Whether more samples would tell more.
     pub(super) fn wants_more(&self) -> bool {
-        self.0.len() < MOST
+        self.0.len() < MANY
     }
 
     /// The class `uncalibrated`, what corrects the attitude with its priors, and why it is taken, where that is clear.
     pub(super) fn told(self, run: &Run<'_>) -> Option<(Noise, Aiding, Diagnostic)> {
-        let noise = Noise::named(WIDE)?;
+        let noise = Noise::preset(WIDE);
         let plan = Plan {
             noise: noise.clone(),
             ..run.plan.clone()
@@ -173,7 +172,7 @@ impl Kept {
 
 impl Evidence {
     /// Whether what was found is what units of the class have, three sigmas: what is farther off is the motion's, or that
-    /// of another fault, and no class explains it.
+    /// of another fault, and no class explains it. The Husky's tilt was 2.05 instead of 0.68 deg rms with this class.
     fn is_within(&self, class: &Settings) -> bool {
         let Calibration {
             scale,
@@ -189,7 +188,8 @@ impl Evidence {
     fn said(&self) -> Diagnostic {
         let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
         let mut what = format!(
-            "taken for a sensor that nobody calibrated (class {WIDE}): by these data that is e^{:.0} times likelier (scale {} %, axes {} deg, accelerometer {} m/s^2",
+            "taken for a sensor that nobody calibrated (class {}): by these data that is e^{:.0} times likelier (scale {} %, axes {} deg, accelerometer {} m/s^2",
+            WIDE.name,
             self.log,
             largest(&self.found.scale, 100.0),
             largest(&self.found.cross, 1f64.to_degrees()),
@@ -269,8 +269,12 @@ mod tests {
             noise,
             ..Plan::default()
         };
-        let meaning = Meaning::new(&plan, &Declared::default());
-        let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);
+        prepared_by(&plan, scale, force)
+    }
+
+    fn prepared_by(plan: &Plan, scale: f64, force: Vector3<f64>) -> Prepared {
+        let meaning = Meaning::new(plan, &Declared::default());
+        let mut preparation = Preparation::new(plan, &meaning, Patience::WholeLog);
         let mut attitude = Quaternion::<Nav, Body>::identity();
         for k in 0..4000 {
             let t = f64::from(k) * 0.01;
@@ -304,7 +308,7 @@ mod tests {
     fn a_sensor_that_nobody_calibrated_is_taken_for_one_and_that_is_said() {
         let off = Vector3::new(0.2, -0.15, 0.1);
         let found = prepared(Noise::by_data(), 0.015, off);
-        assert_eq!(found.noise.name, WIDE);
+        assert_eq!(found.noise.name, WIDE.name);
         assert_eq!(codes(&found), ["class-by-data"]);
         assert!((found.aiding.unwrap().settings.scale_prior - 0.01).abs() < 1e-12);
         // Who states a class is believed.
@@ -320,6 +324,30 @@ mod tests {
             assert_eq!(found.noise.name, NOISE_PRESETS[0].name, "{scale}");
             assert!(codes(&found).is_empty());
         }
+    }
+
+    #[test]
+    fn what_no_class_explains_and_what_is_smoothed_keep_the_class() {
+        let wide = Settings {
+            force_bias_prior: 0.2,
+            ..Settings::default()
+        };
+        let found = |off: f64| Evidence {
+            log: 9.0,
+            found: Calibration {
+                force_bias: Vector3::new(off, 0.0, 0.0),
+                ..Calibration::default()
+            },
+            off_at_rest: None,
+        };
+        assert!(found(0.59).is_within(&wide) && !found(0.66).is_within(&wide));
+        let plan = Plan {
+            aid: Aid::Gravity,
+            smooth: true,
+            ..Plan::default()
+        };
+        let found = prepared_by(&plan, 0.015, Vector3::new(0.2, -0.15, 0.1));
+        assert_eq!(found.noise.name, NOISE_PRESETS[0].name);
     }
 
     #[test]

@@ -13,6 +13,8 @@ use crate::record::{Counts, RateSample, RawSample};
 
 /// Samples that tell the clock and hold the first orientation.
 pub const FEW: usize = 512;
+/// Samples in which is sought what nobody asked for, or what cannot be read twice: three minutes at 1 kHz.
+pub(super) const MANY: usize = 200_000;
 
 /// Samples as the run will condition them.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ mod bias;
 use self::bias::{decide_bias, looks_for_bias, with_bias_of_rest};
 use super::aiding::Aiding;
 use super::class_pass::{self, ClassPass};
-use super::first_pass::{FEW, RestPass};
+use super::first_pass::{FEW, MANY, RestPass};
 use super::intervals::Mismatch;
 use super::meaning::Meaning;
 use super::plan::{Aid, Bias, Initial, Noise, Plan, Truncation};
@@ -28,8 +28,7 @@ use crate::setting::{
 use crate::worlds::{self, Convention, World};
 use nalgebra::Vector3;
 
-/// Samples, and seconds of data, in which rest is sought when the log cannot be read twice.
-const MANY: usize = 200_000;
+/// Seconds of data in which rest is sought when the log cannot be read twice.
 const REST_SECS: f64 = 60.0;
 
 /// Decisions made before the first sample was integrated.

@@ -253,7 +253,7 @@ impl Row {
     /// Puts a value into a plan. Rows are applied in the order of [`ROWS`].
     ///
     /// # Errors
-    /// In words, naming the setting: the value is none of it, or a setting before it rules it out. What only the plan as
+    /// Diagnostic that names the setting: the value is none of it, or a setting before it rules it out. What only the plan as
     /// a whole can tell, [`Plan::check`] refuses.
     pub fn apply(&self, plan: &mut Plan, value: &Value<'_>) -> Result<(), Diagnostic> {
         (self.needs)(plan)?;

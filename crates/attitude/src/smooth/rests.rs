@@ -5,18 +5,14 @@
 //! and points anywhere; a turn that leaves gravity where it is points along it.
 
 use super::segments::{STILL_MEAN, Segment, median_of, median_rate};
-use crate::condition::stillness::{ALONG, BEYOND_CLASS, about_vertical};
+use crate::condition::stillness::{
+    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical,
+};
 use nalgebra::Vector3;
 use std::ops::Range;
 
 /// Runs up to this long must not drift, s.
 const LONGEST_JUDGED: f64 = 20.0;
-/// Rates of one bias differ by no more than this and three of their sigmas, rad/s.
-const SAME: f64 = 0.002;
-/// Total length of all rests, s, below which the short ones are judged more strictly.
-const FEW_SECS: f64 = 10.0;
-/// And these are the short ones, s.
-const SHORT_SECS: f64 = 1.4;
 
 /// Segments one after the other that scatter like a body at rest.
 pub(super) struct Run {

@@ -15,9 +15,8 @@ use strapd_attitude::record::TimeUnit;
 use strapd_attitude::setting::FIELD;
 
 impl Decoder {
-    /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
-    /// that is a bare number, by the recorder's clock and else by its magnitude (until `Decoder::settle_unit` has
-    /// seen more), and for JSON what the messages hold. Without this call such stamps are read by magnitude,
+    /// Learns from one message (the first of the topic) what no schema says: the unit of a bare stamp, by the
+    /// recorder's clock and else by its magnitude (until more were seen), and for JSON what the messages hold. Without this call such stamps are read by magnitude,
     /// one by one.
     ///
     /// # Errors

@@ -65,7 +65,7 @@ impl Decoders {
     /// Settles what only the first messages of a channel tell. Nobody needs the unit of stamps that are not read.
     ///
     /// # Errors
-    /// As `Decoder::settle_unit`.
+    /// [`Unsupported`] when the first stamps fit no unit.
     pub fn settle_unit(
         &self,
         decoder: &mut Decoder,

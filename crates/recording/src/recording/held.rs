@@ -64,7 +64,7 @@ impl Held {
     /// Takes the next message; what is known by now goes out.
     ///
     /// # Errors
-    /// As [`Decoder::settle`] and `Decoder::settle_unit`.
+    /// [`Decoder::settle`]'s; [`Unsupported`] when the first stamps fit no unit.
     pub fn take(
         &mut self,
         copied: Copied,
@@ -90,7 +90,7 @@ impl Held {
     /// Releases what waits, since there are no more to wait for.
     ///
     /// # Errors
-    /// As `Decoder::settle_unit`.
+    /// [`Unsupported`] when the first stamps fit no unit.
     pub fn release(&mut self, decoders: &Decoders, out: &mut Vec<Item>) -> Result<(), Unsupported> {
         let mut openings = Vec::new();
         for copied in &self.waiting {

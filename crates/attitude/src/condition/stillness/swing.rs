@@ -3,6 +3,7 @@
 //! A stage of its own because both who looks for rests in a file and the filter on the way ask it: about any axis but
 //! the vertical a steady turn takes gravity along, and a bias moves nothing.
 
+use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 
 /// Least angle that the gyro must have read for it to be judged, rad (0.25 deg).
@@ -64,9 +65,6 @@ impl Swing {
             read,
             moved,
         } = *self;
-        [steps, read, moved]
-            .iter()
-            .all(|sum| *sum >= 0.0 && sum.is_finite())
-            && seen.is_finite()
+        [steps, read, moved].into_iter().all(is_amount) && are_numbers(&[seen])
     }
 }

@@ -17,11 +17,11 @@ const ACROSS: f64 = 0.1_f64.to_radians();
 /// And it is one above so many sigmas of a bias of the sensor's class.
 pub(crate) const BEYOND_CLASS: f64 = 1.5;
 /// Total length of all rests, s, below which the short ones are judged more strictly.
-const FEW_SECS: f64 = 10.0;
+pub(crate) const FEW_SECS: f64 = 10.0;
 /// And these are the short ones, s.
-const SHORT_SECS: f64 = 1.4;
+pub(crate) const SHORT_SECS: f64 = 1.4;
 /// Rates of one bias differ by no more than this and three of their sigmas, rad/s.
-const SAME: f64 = 0.002;
+pub(crate) const SAME: f64 = 0.002;
 
 /// Rate along the vertical `up` (any length), rad/s, of one that has hardly any across: that of a turn which leaves
 /// gravity where it is.
