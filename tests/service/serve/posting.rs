@@ -412,9 +412,11 @@ fn names_that_are_no_text_are_refused_and_errors_count_objects() {
     assert_eq!(daemon.status()["sources"].as_array().unwrap().len(), 2);
 
     // Another sends it: each object of the array is an error.
-    let mut owner = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    // A watcher of all would first get the last attitudes of the two above.
+    let watch = "{\"class\":\"WATCH\",\"id\":\"taken\"}";
+    let mut owner = Client::tcp(daemon.address(0)).watching(watch);
     owner.send(&rate("taken", 0, 1.0));
-    owner.object("ATT");
+    assert_eq!(owner.object("ATT")["id"], "taken");
     let lines: Vec<String> = (1..31).map(|n| rate("taken", n, 1.0)).collect();
     let (status, said) = post(&daemon, 1, &[JSON], &format!("[{}]", lines.join(",")));
     assert_eq!(
