@@ -58,7 +58,7 @@ pub(in crate::serve) async fn keep(
         if began.elapsed() >= STEADY {
             redial = Redial::default();
         }
-        broker::lost(&reader.outgoing, &why);
+        brokers::lost(&reader.outgoing, &why);
         reader.outgoing.forget_topics();
         tokio::select! {
             () = sleep(redial.failed()) => {}
