@@ -158,6 +158,7 @@ settings! {
     ENCODING = "encoding";
     FIELD = "field";
     FORCE = "force";
+    GYRO_AXES = "gyro_axes";
     GYRO_RANGE = "gyro_range";
     GYRO_UNIT = "gyro_unit";
     IGNORE_COVARIANCE_FLAG = "ignore_covariance_flag";

@@ -28,6 +28,7 @@ class Settings(TypedDict, total=False):
     undo_truncation: Union[Literal["auto", "on", "off"], float, None]
     sensor_delay: Optional[float]
     gyro_unit: Optional[Literal["rad", "deg", "mrad"]]
+    gyro_axes: Optional[str]
     body: Optional[str]
     world: Optional[Literal["start", "level", "enu", "ned", "nwu"]]
     mount: Optional[Vector]
@@ -62,6 +63,7 @@ SETTINGS = frozenset(
         "undo_truncation",
         "sensor_delay",
         "gyro_unit",
+        "gyro_axes",
         "body",
         "world",
         "mount",

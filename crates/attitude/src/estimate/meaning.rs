@@ -38,6 +38,8 @@ pub struct Meaning {
     pub interval_unit_given: bool,
     /// Calibration of the sensor that is known beforehand.
     pub calibration: Option<Arc<SensorCalibration>>,
+    /// Recorded columns of the gyro to those of the sensor. Not a rotation by its type: a map may mirror.
+    gyro_map: Matrix3<f64>,
     /// Columns of the input to the sensor's axes.
     axes: AxisMap,
     mount: Dcm<Body, Sensor>,
@@ -69,6 +71,7 @@ impl Meaning {
             interval: declared.interval.clone(),
             interval_unit_given: declared.interval_unit_given,
             calibration: plan.calibration.clone(),
+            gyro_map: plan.gyro_axes.matrix(),
             axes,
             mount,
             body,
@@ -96,7 +99,7 @@ impl Meaning {
             kind: self.kind,
             unit: self.unit,
             accel_scale: self.accel_scale,
-            gyro_matrix: matrix(SensorCalibration::gyro_matrix),
+            gyro_matrix: matrix(SensorCalibration::gyro_matrix) * self.gyro_map,
             accel_matrix,
             accel_bias: known.map_or_else(Vector3::zeros, |k| accel_matrix * k.force_bias_vector()),
             axes: self.axes,
@@ -114,7 +117,7 @@ impl Meaning {
 
     /// Angle that a recorded sample turned in `secs`.
     pub(super) fn turned(&self, recorded: [f64; 3], secs: f64) -> DeltaAngle {
-        let vector = self.to_body() * Vector3::from(recorded) * self.unit.to_rad();
+        let vector = self.to_body() * self.gyro_map * Vector3::from(recorded) * self.unit.to_rad();
         match self.kind {
             SampleKind::Rate | SampleKind::Average => BodyRate(vector).held_for(secs),
             SampleKind::DeltaAngle | SampleKind::Rotation => DeltaAngle(vector),
@@ -171,7 +174,9 @@ impl Meaning {
             }
         };
         RawSample {
-            gyro: raw.gyro.map(|v| by(axes * self.unit.to_rad(), v)),
+            gyro: raw
+                .gyro
+                .map(|v| by(axes * self.gyro_map * self.unit.to_rad(), v)),
             accel: raw.accel.map(|v| by(axes * self.accel_scale, v)),
             mag: raw.mag.map(|v| by(axes, v)),
             orientation: raw.orientation.map(|wxyz| {
@@ -221,3 +226,6 @@ fn scale_of(unit: Option<AccelUnit>) -> f64 {
         Some(AccelUnit::MetresPerSecondSquared) | None => 1.0,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,7 +6,7 @@
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{self, Clock, GyroUnit, OnGap};
 use crate::diagnostic::Diagnostic;
-use crate::frames::{Body, BodyAxes, Nav, Sensor};
+use crate::frames::{AxisMap, Body, BodyAxes, Nav, Sensor};
 use crate::propagate::{self, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
@@ -35,6 +35,8 @@ pub struct Plan {
     pub kind: Option<SampleKind>,
     /// Unit of the recorded rates. Default: `None`, as the format states it, else rad/s.
     pub unit: Option<GyroUnit>,
+    /// Axes of the gyro's recorded vectors alone, relabelled before `body`; a map may mirror. Default: the identity.
+    pub gyro_axes: AxisMap,
     /// Axes of the recorded vectors, which are relabelled to forward, left, up. Default: `None`, as the format states
     /// them, else [`BodyAxes::Flu`].
     pub body: Option<BodyAxes>,
@@ -139,6 +141,7 @@ impl Default for Plan {
             method: Method::Auto,
             kind: None,
             unit: None,
+            gyro_axes: AxisMap::IDENTITY,
             body: None,
             world: World::Start,
             mount: None,

@@ -43,7 +43,7 @@ const ROW: Row = Row {
 /// Every setting of an estimation.
 // A row is read as one; broken at 100 columns it is a page.
 #[rustfmt::skip]
-pub static ROWS: [Row; 29] = [
+pub static ROWS: [Row; 30] = [
     Row {
         setting: TIME,
         meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
@@ -237,6 +237,21 @@ pub static ROWS: [Row; 29] = [
             word(GyroUnit::Deg.name(), "deg/s", |p| p.unit = Some(GyroUnit::Deg)),
             word(GyroUnit::Mrad.name(), "mrad/s", |p| p.unit = Some(GyroUnit::Mrad)),
         ],
+        ..ROW
+    },
+    Row {
+        setting: GYRO_AXES,
+        meaning: "Axes of the gyro alone, as a signed map before {body}: which recorded axis is x, y, z of the sensor (lower case = reversed)",
+        effect: "For a gyro whose axes are exchanged or reversed against the accelerometer's, which {body} cannot correct, since it relabels both. A map that mirrors, as `xYZ`, is taken.",
+        default: Default::Value("XYZ"),
+        placeholder: "MAP",
+        takes: Takes::Text {
+            what: "a map such as YxZ",
+            set: |p, text| {
+                p.gyro_axes = text.parse().map_err(|e| Diagnostic::from(&e))?;
+                Ok(())
+            },
+        },
         ..ROW
     },
     Row {
