@@ -132,6 +132,7 @@ fn annotation(row: &Row) -> String {
         Takes::Number { .. } => "float",
         Takes::Count(_) => "int",
         Takes::Rate(_) | Takes::Mounting(_) | Takes::Attitude(_) => "Vector",
+        Takes::Factors(_) => "float, Vector",
         Takes::Text { .. } => "str",
         Takes::Figures(_) => "str, dict[str, Any]",
         Takes::Calibration(_) => "str, os.PathLike[str], dict[str, Any]",

@@ -143,6 +143,8 @@ macro_rules! settings {
 
 // What one of an estimation means, stands in its row (`estimate/settings/rows.rs`); of the others, in the command's help.
 settings! {
+    ACCEL_AXES = "accel_axes";
+    ACCEL_SCALE = "accel_scale";
     ACCEL_SIGN = "accel_sign";
     ACCEL_TOPIC = "accel_topic";
     AGAINST_RECORDED = "against_recorded";
@@ -160,11 +162,13 @@ settings! {
     FORCE = "force";
     GYRO_AXES = "gyro_axes";
     GYRO_RANGE = "gyro_range";
+    GYRO_SCALE = "gyro_scale";
     GYRO_UNIT = "gyro_unit";
     IGNORE_COVARIANCE_FLAG = "ignore_covariance_flag";
     INIT = "init";
     JOIN = "join";
     LISTEN = "listen";
+    MAG_AXES = "mag_axes";
     MAG_HARD_IRON = "mag_hard_iron";
     MAG_MOUNT = "mag_mount";
     MAG_TOPIC = "mag_topic";

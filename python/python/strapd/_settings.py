@@ -29,6 +29,10 @@ class Settings(TypedDict, total=False):
     sensor_delay: Optional[float]
     gyro_unit: Optional[Literal["rad", "deg", "mrad"]]
     gyro_axes: Optional[str]
+    gyro_scale: Union[float, Vector, None]
+    accel_axes: Optional[str]
+    accel_scale: Union[float, Vector, None]
+    mag_axes: Optional[str]
     body: Optional[str]
     world: Optional[Literal["start", "level", "enu", "ned", "nwu"]]
     mount: Optional[Vector]
@@ -64,6 +68,10 @@ SETTINGS = frozenset(
         "sensor_delay",
         "gyro_unit",
         "gyro_axes",
+        "gyro_scale",
+        "accel_axes",
+        "accel_scale",
+        "mag_axes",
         "body",
         "world",
         "mount",

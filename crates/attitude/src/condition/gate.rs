@@ -98,9 +98,10 @@ pub(super) struct Gate {
     gyro: Option<Matrix3<f64>>,
     accel: Option<Matrix3<f64>>,
     accel_bias: Vector3<f64>,
-    to_rad: f64,
-    /// Step of truncation in the source's unit.
-    cut: Option<f64>,
+    /// Recorded rates to rad/s, by axis as recorded.
+    to_rad: Vector3<f64>,
+    /// Step of truncation in the source's unit, by axis as recorded.
+    cut: Option<Vector3<f64>>,
     huge: f64,
     range: f64,
 }
@@ -108,16 +109,18 @@ pub(super) struct Gate {
 impl Gate {
     pub(super) fn new(settings: &Settings) -> Self {
         let axes = settings.mount.as_matrix() * settings.axes.matrix();
+        let to_rad = Vector3::from(settings.gyro_scale) * settings.unit.to_rad();
+        let scale = Matrix3::from_diagonal(&Vector3::from(settings.gyro_scale));
         let unless_identity = |m: Matrix3<f64>| (m != Matrix3::identity()).then_some(m);
         Gate {
             kind: settings.kind,
-            gyro: unless_identity(axes * settings.gyro_matrix * settings.unit.to_rad()),
+            gyro: unless_identity(axes * settings.gyro_matrix * scale * settings.unit.to_rad()),
             accel: unless_identity(axes * settings.accel_matrix * settings.accel_scale),
             accel_bias: axes * settings.accel_bias,
-            to_rad: settings.unit.to_rad(),
+            to_rad,
             cut: settings
                 .truncation_step
-                .map(|step| step / settings.unit.to_rad()),
+                .map(|step| to_rad.map(|to_rad| step / to_rad)),
             huge: match settings.kind {
                 SampleKind::DeltaAngle | SampleKind::Rotation => HUGE_ANGLE,
                 SampleKind::Rate | SampleKind::Average => HUGE_RATE,
@@ -144,7 +147,8 @@ impl Gate {
         };
         let gyro = Vector3::from(gyro);
         // max skips NaN; x * 0 is 0 for every finite x and NaN for the others.
-        let largest = gyro.x.abs().max(gyro.y.abs()).max(gyro.z.abs()) * self.to_rad;
+        let in_rad = gyro.component_mul(&self.to_rad);
+        let largest = in_rad.x.abs().max(in_rad.y.abs()).max(in_rad.z.abs());
         let finite = gyro.x * 0.0 + gyro.y * 0.0 + gyro.z * 0.0;
         if finite != 0.0 {
             return Err(Verdict::NotFinite);
@@ -163,7 +167,7 @@ impl Gate {
         }
         let gyro = match self.cut {
             None => gyro,
-            Some(step) => gyro.map(|rate| undone(rate, step)),
+            Some(steps) => gyro.zip_map(&steps, undone),
         };
         let accel = raw.accel.map_or(NO_ACCEL, Vector3::from);
         Ok(Entry {

@@ -8,7 +8,8 @@ use crate::frames::{AxisMap, Body, Dcm, Sensor};
 use crate::quaternion::BodyRate;
 use crate::record::{GyroUnit, SampleKind};
 use crate::setting::{
-    BIAS, CALIBRATION, GYRO_RANGE, MAX_GAP, MOUNT, RATE_HZ, START, UNDO_TRUNCATION, UNTIL,
+    BIAS, CALIBRATION, GYRO_RANGE, GYRO_SCALE, MAX_GAP, MOUNT, RATE_HZ, START, UNDO_TRUNCATION,
+    UNTIL,
 };
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
@@ -41,7 +42,7 @@ impl OnGap {
 /// Settings by which a stream is conditioned.
 ///
 /// # Convention
-/// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * gyro_matrix * unit * v_s - bias`,
+/// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * gyro_matrix * gyro_scale * unit * v_s - bias`,
 /// an acceleration `mount * axes * (accel_matrix * accel_scale * a_s - accel_bias)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -51,6 +52,8 @@ pub struct Settings {
     pub unit: GyroUnit,
     /// Multiply the recorded acceleration by this to get m/s^2.
     pub accel_scale: f64,
+    /// Factors of the recorded rates, by axis as recorded.
+    pub gyro_scale: [f64; 3],
     /// Corrects scale and axes of the gyro, sensor axes. No rotation, and so a bare matrix: its columns are what the
     /// sensor reads of a rate of 1 about each axis, undone.
     pub gyro_matrix: Matrix3<f64>,
@@ -92,6 +95,7 @@ impl Default for Settings {
             kind: SampleKind::Rate,
             unit: GyroUnit::Rad,
             accel_scale: 1.0,
+            gyro_scale: [1.0; 3],
             gyro_matrix: Matrix3::identity(),
             accel_matrix: Matrix3::identity(),
             accel_bias: Vector3::zeros(),
@@ -135,6 +139,7 @@ impl Settings {
             kind,
             unit,
             accel_scale,
+            gyro_scale,
             gyro_matrix,
             accel_matrix,
             accel_bias,
@@ -158,7 +163,12 @@ impl Settings {
              clock: {clock:?}, max_gap_secs: {max_gap_secs:?}, on_gap: {on_gap:?}, truncation_step: {truncation_step:?}, \
              bias: {bias:?}, gyro_range: {gyro_range:?}, start: {start:?}, until: {until:?}, \
              reorder_window: {reorder_window:?} }}"
-        )
+        )?;
+        // Nothing where there is none: what was saved before there was one goes on.
+        match *gyro_scale == [1.0; 3] {
+            true => Ok(()),
+            false => write!(out, " gyro_scale: {gyro_scale:?}"),
+        }
     }
 
     /// Checks everything a person can get wrong.
@@ -200,6 +210,12 @@ impl Settings {
             return fail(format!(
                 "acceleration scale {} is not usable",
                 self.accel_scale
+            ));
+        }
+        if !self.gyro_scale.iter().all(|f| f.is_finite() && *f > 0.0) {
+            return fail(format!(
+                "{GYRO_SCALE}: {:?} are no factors",
+                self.gyro_scale
             ));
         }
         let numbers = self.gyro_matrix.iter().chain(self.accel_matrix.iter());

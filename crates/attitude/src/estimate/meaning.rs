@@ -38,13 +38,35 @@ pub struct Meaning {
     pub interval_unit_given: bool,
     /// Calibration of the sensor that is known beforehand.
     pub calibration: Option<Arc<SensorCalibration>>,
-    /// Recorded columns of the gyro to those of the sensor. Not a rotation by its type: a map may mirror.
-    gyro_map: Matrix3<f64>,
+    /// Recorded columns of each sensor to those of the board.
+    maps: SensorMaps,
+    gyro_scale: [f64; 3],
     /// Columns of the input to the sensor's axes.
     axes: AxisMap,
     mount: Dcm<Body, Sensor>,
     /// Columns of the magnetometer to body axes. Not a rotation by its type: a relabelling may mirror.
     mag_axes: Matrix3<f64>,
+}
+
+/// Maps of single sensors, factors included. No rotations by their type: they may mirror.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct SensorMaps {
+    gyro: Matrix3<f64>,
+    accel: Matrix3<f64>,
+    mag: Matrix3<f64>,
+}
+
+impl SensorMaps {
+    fn of(plan: &Plan) -> SensorMaps {
+        let map = |axes: AxisMap, scale: [f64; 3]| {
+            axes.matrix() * Matrix3::from_diagonal(&Vector3::from(scale))
+        };
+        SensorMaps {
+            gyro: map(plan.gyro_axes, plan.gyro_scale),
+            accel: map(plan.accel_axes, plan.accel_scale),
+            mag: map(plan.mag_axes, [1.0; 3]),
+        }
+    }
 }
 
 impl Meaning {
@@ -71,7 +93,8 @@ impl Meaning {
             interval: declared.interval.clone(),
             interval_unit_given: declared.interval_unit_given,
             calibration: plan.calibration.clone(),
-            gyro_map: plan.gyro_axes.matrix(),
+            maps: SensorMaps::of(plan),
+            gyro_scale: plan.gyro_scale,
             axes,
             mount,
             body,
@@ -99,8 +122,9 @@ impl Meaning {
             kind: self.kind,
             unit: self.unit,
             accel_scale: self.accel_scale,
-            gyro_matrix: matrix(SensorCalibration::gyro_matrix) * self.gyro_map,
-            accel_matrix,
+            gyro_matrix: matrix(SensorCalibration::gyro_matrix) * plan.gyro_axes.matrix(),
+            gyro_scale: self.gyro_scale,
+            accel_matrix: accel_matrix * self.maps.accel,
             accel_bias: known.map_or_else(Vector3::zeros, |k| accel_matrix * k.force_bias_vector()),
             axes: self.axes,
             mount: self.mount,
@@ -115,9 +139,30 @@ impl Meaning {
         }
     }
 
+    /// Recorded rates in rad/s, axes as recorded.
+    pub(super) fn rates(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let ([a, b, c], unit) = (self.gyro_scale, self.unit.to_rad());
+        [x * unit * a, y * unit * b, z * unit * c]
+    }
+
+    /// The sample as if each sensor had been recorded with the axes and factors that its settings say.
+    #[must_use]
+    pub fn remapped(&self, raw: &RawSample) -> RawSample {
+        let by = |map: &Matrix3<f64>, vector: Option<[f64; 3]>| match *map == Matrix3::identity() {
+            true => vector,
+            false => vector.map(|v| (map * Vector3::from(v)).into()),
+        };
+        RawSample {
+            gyro: by(&self.maps.gyro, raw.gyro),
+            accel: by(&self.maps.accel, raw.accel),
+            mag: by(&self.maps.mag, raw.mag),
+            ..*raw
+        }
+    }
+
     /// Angle that a recorded sample turned in `secs`.
     pub(super) fn turned(&self, recorded: [f64; 3], secs: f64) -> DeltaAngle {
-        let vector = self.to_body() * self.gyro_map * Vector3::from(recorded) * self.unit.to_rad();
+        let vector = self.to_body() * self.maps.gyro * Vector3::from(recorded) * self.unit.to_rad();
         match self.kind {
             SampleKind::Rate | SampleKind::Average => BodyRate(vector).held_for(secs),
             SampleKind::DeltaAngle | SampleKind::Rotation => DeltaAngle(vector),
@@ -127,7 +172,7 @@ impl Meaning {
     /// A recorded specific force in m/s^2, as far as the format states its unit.
     #[must_use]
     pub fn force(&self, recorded: [f64; 3]) -> In<Body> {
-        In::assume(self.to_body() * Vector3::from(recorded) * self.accel_scale)
+        In::assume(self.to_body() * self.maps.accel * Vector3::from(recorded) * self.accel_scale)
     }
 
     /// The same, calibrated, where `scale` makes it m/s^2.
@@ -135,7 +180,7 @@ impl Meaning {
         In::assume(match &self.calibration {
             None => self.force(recorded).as_vector() * scale,
             Some(known) => {
-                let force = Vector3::from(recorded) * (self.accel_scale * scale);
+                let force = self.maps.accel * Vector3::from(recorded) * (self.accel_scale * scale);
                 self.to_body() * (known.force_matrix() * (force - known.force_bias_vector()))
             }
         })
@@ -143,7 +188,7 @@ impl Meaning {
 
     /// A recorded magnetic field, calibrated, and for how long after its stamp it is that, s.
     pub(super) fn field(&self, recorded: [f64; 3]) -> (In<Body>, f64) {
-        let field = Vector3::from(recorded);
+        let field = self.maps.mag * Vector3::from(recorded);
         let (field, lead) = match &self.calibration {
             None => (self.mag_axes * field, 0.0),
             Some(known) => (
@@ -165,7 +210,7 @@ impl Meaning {
     /// promises. The same products as in conditioning, so that no bit is lost on the way through one.
     #[must_use]
     pub fn in_flu(&self, raw: &RawSample) -> RawSample {
-        let axes = self.axes.matrix();
+        let (axes, raw) = (self.axes.matrix(), &self.remapped(raw));
         let by = |m: Matrix3<f64>, v: [f64; 3]| {
             if m == Matrix3::identity() {
                 v
@@ -174,9 +219,7 @@ impl Meaning {
             }
         };
         RawSample {
-            gyro: raw
-                .gyro
-                .map(|v| by(axes * self.gyro_map * self.unit.to_rad(), v)),
+            gyro: raw.gyro.map(|v| by(axes * self.unit.to_rad(), v)),
             accel: raw.accel.map(|v| by(axes * self.accel_scale, v)),
             mag: raw.mag.map(|v| by(axes, v)),
             orientation: raw.orientation.map(|wxyz| {

@@ -11,8 +11,9 @@ use crate::propagate::{self, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
 use crate::setting::{
-    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_HARD_IRON, MAG_MOUNT, METHOD,
-    RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, UNDO_TRUNCATION, WORLD,
+    ACCEL_SCALE, AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_AXES, MAG_HARD_IRON,
+    MAG_MOUNT, METHOD, RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, UNDO_TRUNCATION,
+    WORLD,
 };
 use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
@@ -37,6 +38,14 @@ pub struct Plan {
     pub unit: Option<GyroUnit>,
     /// Axes of the gyro's recorded vectors alone, relabelled before `body`; a map may mirror. Default: the identity.
     pub gyro_axes: AxisMap,
+    /// Factors of the gyro's recorded columns, before `gyro_axes`. Default: 1.
+    pub gyro_scale: [f64; 3],
+    /// Axes of the accelerometer alone, as `gyro_axes`. Default: the identity.
+    pub accel_axes: AxisMap,
+    /// Factors of the accelerometer's recorded columns, before `accel_axes`. Default: 1.
+    pub accel_scale: [f64; 3],
+    /// Axes of the magnetometer alone, before `mag_mount` or `body`. Default: the identity.
+    pub mag_axes: AxisMap,
     /// Axes of the recorded vectors, which are relabelled to forward, left, up. Default: `None`, as the format states
     /// them, else [`BodyAxes::Flu`].
     pub body: Option<BodyAxes>,
@@ -142,6 +151,10 @@ impl Default for Plan {
             kind: None,
             unit: None,
             gyro_axes: AxisMap::IDENTITY,
+            gyro_scale: [1.0; 3],
+            accel_axes: AxisMap::IDENTITY,
+            accel_scale: [1.0; 3],
+            mag_axes: AxisMap::IDENTITY,
             body: None,
             world: World::Start,
             mount: None,
@@ -206,11 +219,15 @@ impl Plan {
                 Bias::Unsaid | Bias::None | Bias::Auto => BodyRate::ZERO,
             },
             gyro_range: self.gyro_range,
+            gyro_scale: self.gyro_scale,
             start: self.start,
             until: self.until,
             ..condition::Settings::default()
         };
         conditioning.validate().map_err(|e| e.to_string())?;
+        if !self.accel_scale.iter().all(|f| f.is_finite() && *f > 0.0) {
+            return Err(format!("{ACCEL_SCALE}: {:?} are no factors", self.accel_scale).into());
+        }
         if self.sensor_delay_secs.is_nan() || self.sensor_delay_secs.abs() > LONGEST_DELAY {
             return Err(Diagnostic::new(format!(
                 "{SENSOR_DELAY}: {} s is no delay of a sensor",
@@ -272,6 +289,12 @@ impl Plan {
         if self.mag_mount.is_some() && !has_field {
             return Err(
                 Diagnostic::new(format!("{MAG_MOUNT}: no magnetic field is used"))
+                    .help(format!("{AID} gravity+mag")),
+            );
+        }
+        if self.mag_axes != AxisMap::IDENTITY && !has_field {
+            return Err(
+                Diagnostic::new(format!("{MAG_AXES}: no magnetic field is used"))
                     .help(format!("{AID} gravity+mag")),
             );
         }

@@ -150,7 +150,7 @@ impl Preparation {
         if let (Some(rates), Some(gyro)) = (&mut self.rates, raw.gyro)
             && rates.len() < MANY
         {
-            rates.push(gyro.map(|w| w * self.resolved.unit.to_rad()));
+            rates.push(self.resolved.rates(gyro));
         }
         if let Some(class) = &mut self.class {
             class.take(raw);

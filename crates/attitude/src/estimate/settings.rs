@@ -94,6 +94,8 @@ pub enum Takes {
     Count(fn(&mut Plan, usize)),
     /// Three numbers about the body axes x, y, z, rad/s.
     Rate(fn(&mut Plan, [f64; 3])),
+    /// A factor above 0 of each axis, or one for all.
+    Factors(fn(&mut Plan, [f64; 3])),
     /// A mounting, as a unit quaternion w, x, y, z.
     Mounting(fn(&mut Plan, Quaternion<Body, Sensor>)),
     /// An attitude: a unit quaternion w, x, y, z, or roll, pitch and yaw in degrees.
@@ -220,6 +222,7 @@ impl Takes {
             }
             Takes::Count(_) => "a number of samples".to_owned(),
             Takes::Rate(_) => "3 numbers x,y,z in rad/s".to_owned(),
+            Takes::Factors(_) => "a factor above 0, or 3 of them x,y,z".to_owned(),
             Takes::Mounting(_) => "4 numbers q=w,x,y,z".to_owned(),
             Takes::Attitude(_) => {
                 "4 numbers q=w,x,y,z, or 3 numbers rpy=roll,pitch,yaw in degrees".to_owned()
@@ -275,6 +278,7 @@ impl Row {
             },
             Takes::Count(set) => set(plan, text.parse().map_err(|_| wrong())?),
             Takes::Rate(set) => set(plan, read::numbers(&text).ok_or_else(wrong)?),
+            Takes::Factors(set) => set(plan, read::factors(&text).ok_or_else(wrong)?),
             Takes::Mounting(set) => set(plan, self.quaternion(&text)?),
             Takes::Attitude(set) => match read::roll_pitch_yaw(&text) {
                 Some(q_nb) => set(plan, q_nb),

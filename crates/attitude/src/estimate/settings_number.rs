@@ -5,6 +5,7 @@
 
 use super::plan::Plan;
 use super::preparation::Prepared;
+use crate::frames::AxisMap;
 use crate::{condition, propagate};
 use std::fmt::{self, Write};
 
@@ -37,6 +38,9 @@ pub(super) fn settings_number(
             write!(hash, " {:?} {:?}", aiding.settings, aiding.start)?;
             write!(hash, " {} {}", aiding.force_scale, plan.declination)?;
             write!(hash, " {:?}", plan.mag_mount.map(|q_bs| q_bs.wxyz()))?;
+            if plan.mag_axes != AxisMap::IDENTITY {
+                write!(hash, " {}", plan.mag_axes)?;
+            }
         }
         match &plan.calibration {
             Some(known) => write!(hash, " {known:?}"),

@@ -76,6 +76,7 @@ fn every_row_says_what_it_is_and_sets_something_of_its_own() {
             Takes::Count(_) => Value::Number(7.0),
             Takes::Rate(_) => Value::Numbers(&[0.1, -0.2, 0.3]),
             Takes::Mounting(_) | Takes::Attitude(_) => Value::Numbers(&[0.0, 0.6, 0.8, 0.0]),
+            Takes::Factors(_) => Value::Number(0.5),
             Takes::Text { .. } => Value::Text("YxZ"),
             Takes::Figures(_) => Value::Text("arw=0.2"),
             Takes::Calibration(_) => Value::Calibration(SensorCalibration::default().into()),
@@ -252,6 +253,17 @@ fn a_value_that_is_none_is_refused_with_what_is_expected() {
             "expected auto, on, off, or on=STEP from 0 to 1 in rad/s",
         ),
         ("body", "XXY", "body: "),
+        ("gyro_axes", "XXY", "gyro_axes: "),
+        (
+            "gyro_scale",
+            "-1",
+            "gyro_scale -1: expected a factor above 0, or 3 of them",
+        ),
+        (
+            "accel_scale",
+            "1,2",
+            "accel_scale 1,2: expected a factor above 0",
+        ),
         ("smooth", "yes", "smooth yes: expected true or false"),
         ("calibration", "imu.toml", "expected a calibration"),
     ] {

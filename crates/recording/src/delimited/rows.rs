@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use strapd_attitude::frames::Sensor;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
-use strapd_attitude::setting::GYRO_UNIT;
+use strapd_attitude::setting::{GYRO_SCALE, GYRO_UNIT};
 
 /// Columns that make a table one of samples or of attitudes.
 const GYRO: [Column; 3] = [Column::Gyro(0), Column::Gyro(1), Column::Gyro(2)];
@@ -187,7 +187,7 @@ impl Table {
     pub(crate) fn doubt_of_unit(&self) -> Option<String> {
         let is_open = !self.is_own() && self.has_rate() && self.declared.gyro_unit.is_none();
         is_open.then(|| {
-            format!("the unit of the rates is not stated, and taken for rad/s: {GYRO_UNIT} deg, if it is deg/s")
+            format!("the unit of the rates is not stated, and taken for rad/s: {GYRO_UNIT} or {GYRO_SCALE} states another")
         })
     }
 

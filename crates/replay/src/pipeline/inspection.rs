@@ -80,7 +80,8 @@ impl Si {
         }
     }
 
-    fn of(&self, raw: &RawSample) -> RawSample {
+    fn of(&self, raw: &RawSample, resolved: &Meaning) -> RawSample {
+        let raw = &resolved.remapped(raw);
         let by = |vector: Option<[f64; 3]>, by: f64| vector.map(|v| v.map(|value| value * by));
         RawSample {
             gyro: by(raw.gyro, self.rate),
@@ -103,7 +104,7 @@ impl TopicInspector {
             self.stamps.push(sample);
         })?;
         if self.clock.is_some() {
-            self.quality.push(&self.si.of(raw));
+            self.quality.push(&self.si.of(raw, &self.resolved));
             return Ok(());
         }
         self.first.push(*raw);
@@ -118,7 +119,7 @@ impl TopicInspector {
         self.quality = Quality::new(clock);
         self.aid = Aids::of(&self.plan, &self.resolved, &self.first, &self.beside);
         for raw in self.first.drain(..) {
-            self.quality.push(&self.si.of(&raw));
+            self.quality.push(&self.si.of(&raw, &self.resolved));
         }
         self.clock = Some((clock, warning.as_ref().map(Diagnostic::from)));
     }

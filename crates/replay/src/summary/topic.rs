@@ -16,10 +16,11 @@ use crate::finding::{Finding, Severity};
 use serde_json::{Map, Value, json};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, SensorCalibration, learned};
+use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, SampleKind, Verdict};
-use strapd_attitude::setting::AID;
+use strapd_attitude::setting::{ACCEL_AXES, ACCEL_SCALE, AID, GYRO_AXES, GYRO_SCALE, MAG_AXES};
 use strapd_attitude::worlds::EARTH_RATE;
 
 /// Summary of one topic: of a log, or of samples that still come.
@@ -55,6 +56,8 @@ pub struct TopicSummary {
     pub method: String,
     /// Axes of the recorded numbers.
     pub input_axes: String,
+    /// Maps and factors of single sensors, where settings state them.
+    pub sensor_maps: Option<String>,
     /// Axes of the body.
     pub body: String,
     /// World of the attitude.
@@ -171,6 +174,7 @@ impl TopicSummary {
                 .integration_error
                 .filter(|_| recording.is_none()),
             input_axes: resolved.body.to_string(),
+            sensor_maps: sensor_maps(plan),
             gaps,
             turned: propagation.angle_turned,
             largest_step: propagation.largest_step,
@@ -224,6 +228,8 @@ impl TopicSummary {
                 [format!("{}; {}", self.method, meaning(self.kind))],
             ),
             Row::value("input_axes", self.input_axes.as_str()),
+            Row::value("sensor_maps", self.sensor_maps.as_deref())
+                .told("sensors", self.sensor_maps.clone()),
             Row::value("body", self.body.as_str()),
             Row::value("world", self.world.as_str()),
             Row::value("initial", self.initial.as_str()).told("frames", [self.frames_text()]),
@@ -446,6 +452,31 @@ impl TopicSummary {
             ),
         }
     }
+}
+
+/// Maps and factors of single sensors that differ from nothing.
+fn sensor_maps(plan: &Plan) -> Option<String> {
+    let axes = [
+        (GYRO_AXES, plan.gyro_axes),
+        (ACCEL_AXES, plan.accel_axes),
+        (MAG_AXES, plan.mag_axes),
+    ];
+    let maps = axes.iter().filter(|(_, map)| *map != AxisMap::IDENTITY);
+    let maps = maps.map(|(setting, map)| match map.mirrors() {
+        true => format!("{setting} {map} (mirrors)"),
+        false => format!("{setting} {map}"),
+    });
+    let scales = [
+        (GYRO_SCALE, plan.gyro_scale),
+        (ACCEL_SCALE, plan.accel_scale),
+    ];
+    let scales = scales.iter().filter(|(_, factors)| *factors != [1.0; 3]);
+    let scales = scales.map(|(setting, [x, y, z])| match x == y && y == z {
+        true => format!("{setting} {x}"),
+        false => format!("{setting} {x},{y},{z}"),
+    });
+    let all: Vec<String> = maps.chain(scales).collect();
+    (!all.is_empty()).then(|| all.join(", "))
 }
 
 /// Finding of something that the preparation, or a run, noticed.

@@ -14,7 +14,11 @@ fn recorded() -> Vec<RawSample> {
         let (sin, cos) = (0.8 * t).sin_cos();
         RawSample {
             header: Some(Nanos(1_000_000_000 + i64::from(k) * 10_000_000)),
-            gyro: Some([0.8 * f64::from(k > 200), 0.1 * cos * f64::from(k > 200), 0.02]),
+            gyro: Some([
+                0.8 * f64::from(k > 200),
+                0.1 * cos * f64::from(k > 200),
+                0.02,
+            ]),
             accel: Some([0.3, STANDARD_GRAVITY * sin, STANDARD_GRAVITY * cos]),
             mag: Some([20.0, 3.0, -40.0]),
             ..RawSample::default()
@@ -26,7 +30,10 @@ fn recorded() -> Vec<RawSample> {
 fn plan(given: &[(&str, &str)]) -> Plan {
     let mut plan = defaults();
     for (name, text) in given {
-        row(name).unwrap().apply(&mut plan, &Value::Text(text)).unwrap();
+        row(name)
+            .unwrap()
+            .apply(&mut plan, &Value::Text(text))
+            .unwrap();
     }
     plan.check().unwrap();
     plan
@@ -75,11 +82,47 @@ fn a_map_of_one_sensor_is_as_if_it_had_been_recorded_so() {
 }
 
 #[test]
+fn factors_and_maps_of_all_sensors_are_as_if_recorded_so() {
+    let good = recorded();
+    // Counts of a sensor whose driver exchanges the axes of each of its parts.
+    let bad: Vec<RawSample> = good
+        .iter()
+        .map(|raw| RawSample {
+            gyro: raw
+                .gyro
+                .map(|[x, y, z]| [-y * 1000.0, x * 2000.0, z * 500.0]),
+            accel: raw
+                .accel
+                .map(|[x, y, z]| [z * 200.0, x * 200.0, -y * 200.0]),
+            mag: raw.mag.map(|[x, y, z]| [y, x, -z]),
+            ..*raw
+        })
+        .collect();
+    let common = [("aid", "gravity+mag"), ("body", "frd"), ("gyro_range", "8")];
+    let maps = [
+        ("gyro_axes", "YxZ"),
+        ("gyro_scale", "0.001,0.0005,0.002"),
+        ("accel_axes", "YzX"),
+        ("accel_scale", "0.005"),
+        ("mag_axes", "YXz"),
+    ];
+    let expected = attitudes(&plan(&common), &good);
+    let cured = attitudes(&plan(&[&common[..], &maps[..]].concat()), &bad);
+    assert!(farthest(&expected, &cured) < 1e-9);
+    // Ranges are those of the sensor, not of its counts: nothing is flagged.
+    assert_eq!(expected[400].status, cured[400].status);
+    assert!(farthest(&expected, &attitudes(&plan(&common), &bad)) > 0.5);
+}
+
+#[test]
 fn a_map_may_mirror_and_is_in_what_others_are_sent() {
     let plan = plan(&[("gyro_axes", "xYZ")]);
     let meaning = Meaning::new(&plan, &Declared::default());
     let sent = meaning.in_flu(&recorded()[300]);
     assert_eq!(sent.gyro.unwrap()[0], -0.8);
     assert_eq!(sent.accel, recorded()[300].accel);
-    assert_eq!(meaning.turned([1.0, 2.0, 3.0], 1.0).0, Vector3::new(-1.0, 2.0, 3.0));
+    assert_eq!(
+        meaning.turned([1.0, 2.0, 3.0], 1.0).0,
+        Vector3::new(-1.0, 2.0, 3.0)
+    );
 }

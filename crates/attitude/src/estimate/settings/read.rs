@@ -19,6 +19,12 @@ pub(super) fn numbers<const N: usize>(list: &str) -> Option<[f64; N]> {
     parsed?.try_into().ok()
 }
 
+/// One factor for all axes, or one of each; above 0.
+pub(super) fn factors(text: &str) -> Option<[f64; 3]> {
+    let all = numbers(text).or_else(|| finite(text).map(|all| [all; 3]))?;
+    all.iter().all(|factor| *factor > 0.0).then_some(all)
+}
+
 fn finite(text: &str) -> Option<f64> {
     number("", text).filter(|v| v.is_finite())
 }

@@ -43,7 +43,7 @@ const ROW: Row = Row {
 /// Every setting of an estimation.
 // A row is read as one; broken at 100 columns it is a page.
 #[rustfmt::skip]
-pub static ROWS: [Row; 30] = [
+pub static ROWS: [Row; 34] = [
     Row {
         setting: TIME,
         meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
@@ -249,6 +249,53 @@ pub static ROWS: [Row; 30] = [
             what: "a map such as YxZ",
             set: |p, text| {
                 p.gyro_axes = text.parse().map_err(|e| Diagnostic::from(&e))?;
+                Ok(())
+            },
+        },
+        ..ROW
+    },
+    Row {
+        setting: GYRO_SCALE,
+        meaning: "Factor of the recorded rates: one, or x,y,z for the recorded axes, before {gyro_axes}",
+        effect: "For rates in counts, or read with the wrong range: 0.0010642 makes rad/s of the counts of a sensor with 16.4 of them per deg/s. {gyro_unit} is applied as well.",
+        default: Default::Value("1"),
+        placeholder: "FACTOR",
+        takes: Takes::Factors(|p, factors| p.gyro_scale = factors),
+        ..ROW
+    },
+    Row {
+        setting: ACCEL_AXES,
+        meaning: "Axes of the accelerometer alone, as {gyro_axes}",
+        default: Default::Value("XYZ"),
+        placeholder: "MAP",
+        takes: Takes::Text {
+            what: "a map such as YxZ",
+            set: |p, text| {
+                p.accel_axes = text.parse().map_err(|e| Diagnostic::from(&e))?;
+                Ok(())
+            },
+        },
+        ..ROW
+    },
+    Row {
+        setting: ACCEL_SCALE,
+        meaning: "Factor of the recorded specific forces: one, or x,y,z for the recorded axes, before {accel_axes}",
+        effect: "For forces in counts: 0.0047884 makes m/s^2 of the counts of a sensor with 2048 of them per g.",
+        default: Default::Value("1"),
+        placeholder: "FACTOR",
+        takes: Takes::Factors(|p, factors| p.accel_scale = factors),
+        ..ROW
+    },
+    Row {
+        setting: MAG_AXES,
+        meaning: "Axes of the magnetometer alone, as {gyro_axes}, before {mag_mount} or {body}",
+        effect: "For a magnetometer whose axes are not those of its board, as the AK8963's in an MPU-9250: `YXz`.",
+        default: Default::Value("XYZ"),
+        placeholder: "MAP",
+        takes: Takes::Text {
+            what: "a map such as YxZ",
+            set: |p, text| {
+                p.mag_axes = text.parse().map_err(|e| Diagnostic::from(&e))?;
                 Ok(())
             },
         },
