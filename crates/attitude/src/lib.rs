@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! frames -> quaternion -> worlds -> record -> condition -> propagate -> aid -> smooth
-//!                                   noise, compare: beside it
+//!                                   consistency, noise, compare: beside it
 //! ```
 //!
 //! | module | arrow |
@@ -18,6 +18,7 @@
 //! | [`aid`] | specific force, field -> corrections of attitude and sensor |
 //! | [`smooth`] | a whole recording -> the best attitudes it can give, and its sensor |
 //! | [`estimate`] | all of these in one: what is asked for and the first samples -> an estimator -> attitude |
+//! | [`consistency`] | rates and forces -> whether gyro and accelerometer speak of the same body |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
 //! | [`setting`] | what can be set for a run -> what a person reads of it |
@@ -56,6 +57,7 @@
 pub mod aid;
 pub mod compare;
 pub mod condition;
+pub mod consistency;
 pub mod diagnostic;
 pub mod digits;
 pub mod estimate;

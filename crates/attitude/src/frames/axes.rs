@@ -51,6 +51,22 @@ impl AxisMap {
         Take::new(Axis::Z).negated(),
     ]);
 
+    /// The map of a signed permutation matrix; `None` of any other.
+    pub(crate) fn from_matrix(matrix: &Matrix3<f64>) -> Option<AxisMap> {
+        let take = |row: usize| {
+            let entries = [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate();
+            entries
+                .map(|(column, axis)| (axis, matrix[(row, column)]))
+                .find(|(_, entry)| *entry != 0.0)
+                .map(|(axis, entry)| Take {
+                    axis,
+                    negated: entry < 0.0,
+                })
+        };
+        let map = AxisMap([take(0)?, take(1)?, take(2)?]);
+        (map.matrix() == *matrix).then_some(map)
+    }
+
     /// Relabels three components. No arithmetic but signs: exact.
     #[must_use]
     pub fn apply(self, v: [f64; 3]) -> [f64; 3] {
@@ -63,6 +79,22 @@ impl AxisMap {
             };
             if take.negated { -component } else { component }
         })
+    }
+
+    /// The map that relabels as `first` does, and then as this one.
+    #[must_use]
+    pub fn after(self, first: AxisMap) -> AxisMap {
+        AxisMap(self.0.map(|take| {
+            let by = match take.axis {
+                Axis::X => first.0[0],
+                Axis::Y => first.0[1],
+                Axis::Z => first.0[2],
+            };
+            match take.negated {
+                true => by.negated(),
+                false => by,
+            }
+        }))
     }
 
     /// Whether it turns right-handed axes into left-handed ones.

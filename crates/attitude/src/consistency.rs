@@ -1,0 +1,259 @@
+//! Rates and forces -> whether gyro and accelerometer speak of the same body. Pure.
+//!
+//! A stage of its own because a filter cannot tell: of a gyro whose axes are exchanged it takes gravity for
+//! acceleration. Gravity stands still in the world, so under the right map of the gyro's axes its mean stands still in
+//! the integrated frame, and under a wrong one it wanders.
+//!
+//! ```text
+//! Reading -> blocks (20 ms, bias of rest) -> segment (4 s: scatter of gravity under a map) -> bank (evidence) -> refine
+//! ```
+//!
+//! The bank runs only where gravity wanders as recorded, which healthy sensors do not let it do. Memory is bounded, and
+//! what is said does not depend on how readings arrive.
+//!
+//! Theory, thresholds and what cannot be seen: `docs/theory/consistency.md`.
+
+mod bank;
+mod blocks;
+mod refine;
+mod segment;
+#[cfg(test)]
+mod tests;
+
+use self::bank::{Answer, BANK, Evidence, Verdict};
+use self::blocks::{Block, Blocks, Rest, Step};
+use self::refine::refine;
+use self::segment::{SEGMENT_SECS, Segment};
+use crate::frames::AxisMap;
+use crate::record::{Measured, Nanos};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::VecDeque;
+
+/// A segment begins every so many nanoseconds, and is so long.
+const HOP_NANOS: i64 = 2_000_000_000;
+const SEGMENT_NANOS: i64 = (SEGMENT_SECS * 1e9) as i64;
+/// Rounding of stamps.
+const SLACK_NANOS: i64 = 1_000;
+/// Sigma of the bias, rad/s, without a rest and after one.
+const BIAS_FREE: f64 = 0.1;
+const BIAS_KNOWN: f64 = 0.01;
+/// Change of the running length of gravity with a block.
+const GRAVITY_STEP: f64 = 1.002;
+/// The bank runs once this share of the last segments, of which there are so many, scatters by more than this, g.
+const GATE_SCATTER: f64 = 0.05;
+const GATE_SHARE: f64 = 0.4;
+const GATE_LAST: usize = 8;
+const GATE_LEAST: usize = 3;
+/// Segments before the gate opens that the bank is given.
+const GATE_BACK: usize = 3;
+/// Segments by which a factor is refined.
+const REFINED_BY: usize = 32;
+/// Segments in a row for which a verdict holds before it is said.
+const HOLD: usize = 3;
+
+/// A rate with the force that belongs to it, in the axes of the sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// Instant of the rate, or end of its interval.
+    pub stamp: Nanos,
+    /// Rate, rad/s, or what was turned since the reading before, rad.
+    pub gyro: Measured,
+    /// Specific force, up at rest, in any unit.
+    pub force: Vector3<f64>,
+}
+
+/// What gyro and accelerometer disagree about.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Cause {
+    /// Axes of the gyro: true rates by recorded ones.
+    Axes {
+        /// Map that makes gravity stand still.
+        map: AxisMap,
+        /// Recorded axes whose place the motion decides.
+        decided: [bool; 3],
+    },
+    /// Scale, or unit, of the gyro.
+    Scale {
+        /// True rates are so many times the recorded ones.
+        factor: f64,
+        /// One standard deviation of the factor, as a share of it.
+        sigma: f64,
+    },
+    /// No map explains it: the rates are wrong, or gravity stays with the body.
+    Unknown,
+}
+
+/// Disagreement of gyro and accelerometer.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Disagreement {
+    /// Cause.
+    pub cause: Cause,
+    /// Median scatter of gravity in the integrated frame as recorded, g: 0.02 of healthy sensors.
+    pub recorded: f64,
+    /// The same when the recording is integrated with what the cause names, g.
+    pub cured: f64,
+    /// Segments of four seconds in which it shows.
+    pub segments: usize,
+}
+
+/// Watches gyro and accelerometer of one stream.
+#[derive(Clone, Debug)]
+pub struct Consistency {
+    blocks: Blocks,
+    rest: Rest,
+    run: Vec<Block>,
+    gravity: Option<f64>,
+    /// Scatter as recorded, with the bias that suits it.
+    identity: bank::Residuals,
+    /// Whether the last segments scattered.
+    scattered: VecDeque<bool>,
+    kept: VecDeque<Segment>,
+    bank: Option<Evidence>,
+    held: usize,
+    said: Option<Verdict>,
+}
+
+impl Default for Consistency {
+    fn default() -> Consistency {
+        Consistency {
+            blocks: Blocks::default(),
+            rest: Rest::default(),
+            run: Vec::new(),
+            gravity: None,
+            identity: bank::Residuals::new(1),
+            scattered: VecDeque::new(),
+            kept: VecDeque::new(),
+            bank: None,
+            held: 0,
+            said: None,
+        }
+    }
+}
+
+impl Consistency {
+    /// Takes the next reading; one without numbers is passed over.
+    pub fn push(&mut self, reading: &Reading) {
+        let mut numbers = reading.gyro.as_vector().iter().chain(&reading.force);
+        if !numbers.all(|number| number.is_finite()) {
+            return;
+        }
+        match self.blocks.push(reading) {
+            Step::Open => {}
+            Step::Broken => self.run.clear(),
+            Step::Full(block) => self.take(block),
+        }
+    }
+
+    /// Breaks the run: what comes next does not follow.
+    pub fn interrupt(&mut self) {
+        self.blocks.interrupt();
+        self.run.clear();
+    }
+
+    /// Disagreement that is seen; `None` where there is none, or too little motion to tell.
+    #[must_use]
+    pub fn disagreement(&self) -> Option<Disagreement> {
+        let verdict = self.said?;
+        let cause = match verdict.answer {
+            Answer::Map(decided) => BANK
+                .get(verdict.hypothesis)
+                .and_then(|hypothesis| AxisMap::from_matrix(&hypothesis.map))
+                .map(|map| (Cause::Axes { map, decided }, verdict.found)),
+            Answer::Factor => self.refined(&verdict),
+            Answer::Contradiction => None,
+        };
+        let (cause, cured) = cause.unwrap_or((Cause::Unknown, verdict.found));
+        Some(Disagreement {
+            cause,
+            recorded: verdict.identity,
+            cured,
+            segments: verdict.segments,
+        })
+    }
+
+    /// Median scatter of gravity in the last segments when true rates are `factor` times the recorded ones, g; `None`
+    /// where there is nothing to judge by.
+    #[must_use]
+    pub fn scatter_by(&self, factor: f64) -> Option<f64> {
+        let map = Matrix3::from_diagonal_element(factor);
+        let found = refine::<3>(self.kept.iter(), &map, &[])?;
+        Some(found.left).filter(|left| left.is_finite())
+    }
+
+    /// The factor near that of the bank which makes gravity stand still best.
+    fn refined(&self, verdict: &Verdict) -> Option<(Cause, f64)> {
+        let start = BANK.get(verdict.hypothesis)?.map;
+        let found = refine::<4>(self.kept.iter(), &start, &[Matrix3::identity()])?;
+        let factor = found.map[(0, 0)];
+        let sigma = found.sigma[3] * start[(0, 0)] / factor;
+        let is_sound = factor.is_finite() && factor > 0.0 && sigma.is_finite();
+        is_sound.then_some((Cause::Scale { factor, sigma }, found.left))
+    }
+
+    fn take(&mut self, block: Block) {
+        let length = block.force.norm();
+        let gravity = match self.gravity {
+            None => length,
+            Some(gravity) if length > gravity => gravity * GRAVITY_STEP,
+            Some(gravity) => gravity / GRAVITY_STEP,
+        };
+        self.gravity = (gravity > 0.0).then_some(gravity);
+        if self.gravity.is_none() {
+            return;
+        }
+        self.rest.push(&block, gravity);
+        self.run.push(block);
+        let Some(start) = self.run.first().map(|first| first.start) else {
+            return;
+        };
+        if block.end.since(start) >= SEGMENT_NANOS - SLACK_NANOS {
+            self.close(gravity);
+            self.run
+                .retain(|block| block.start.since(start) >= HOP_NANOS - SLACK_NANOS);
+        }
+    }
+
+    /// Judges the segment that the run of blocks makes.
+    fn close(&mut self, gravity: f64) {
+        let bias = self.rest.bias();
+        let sigma = bias.map_or(BIAS_FREE, |_| BIAS_KNOWN);
+        let segment = Segment::new(&self.run, gravity, bias, sigma);
+        if !segment.moves() {
+            return;
+        }
+        let scatter = self
+            .identity
+            .push(&segment)
+            .first()
+            .map_or(0.0, |s| s.sqrt());
+        self.scattered.push_back(scatter > GATE_SCATTER);
+        if self.scattered.len() > GATE_LAST {
+            self.scattered.pop_front();
+        }
+        self.kept.push_back(segment);
+        let most = self.bank.as_ref().map_or(GATE_BACK + 1, |_| REFINED_BY);
+        if self.kept.len() > most {
+            self.kept.pop_front();
+        }
+        let scattered = self.scattered.iter().filter(|s| **s).count() as f64;
+        let opens = self.scattered.len() >= GATE_LEAST
+            && scattered >= GATE_SHARE * self.scattered.len() as f64;
+        match &mut self.bank {
+            Some(bank) => self
+                .kept
+                .back()
+                .into_iter()
+                .for_each(|last| bank.push(last)),
+            None if opens => {
+                let bank = self.bank.insert(Evidence::new());
+                self.kept.iter().for_each(|segment| bank.push(segment));
+            }
+            None => return,
+        }
+        let verdict = self.bank.as_ref().and_then(Evidence::verdict);
+        self.held = verdict.map_or(0, |_| self.held + 1);
+        if self.held >= HOLD {
+            self.said = verdict;
+        }
+    }
+}

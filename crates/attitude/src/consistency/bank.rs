@@ -1,0 +1,307 @@
+//! Segments -> evidence for each of a bank of maps, and what may be said by it. Pure.
+//!
+//! A stage of its own because it is a rule of evidence: what is said must hold in nearly all segments, be seen to be
+//! better than no rotation at all, and stand by a residual as small as that of healthy sensors.
+
+use super::segment::Segment;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::VecDeque;
+use std::sync::LazyLock;
+
+/// Signed axis maps in the bank: all there are, the identity first.
+pub(super) const MAPS: usize = 48;
+/// Factors are powers of this, of these exponents without 0.
+const RATIO: f64 = 1.25;
+const EXPONENTS: std::ops::RangeInclusive<i32> = -41..=10;
+/// Hypotheses in the bank.
+const HYPOTHESES: usize = MAPS + 51;
+/// Segments that count: what came before is forgotten.
+const MEMORY: usize = 64;
+/// Scatter of gravity that is none, g^2.
+const FLOOR: f64 = 4e-4;
+/// Most that one segment says.
+const CLIP: f64 = 3.0;
+/// Evidence of a segment that tells something.
+const TELLING: f64 = 0.3;
+
+/// Least evidence, telling segments, and share of them that agree.
+const LEAST_EVIDENCE: f64 = 8.0;
+const LEAST_SEGMENTS: usize = 6;
+const LEAST_SHARE: f64 = 0.85;
+/// Largest scatter of the map that is found, g, and by that of the identity.
+const LARGEST_FOUND: f64 = 0.06;
+const LARGEST_RATIO: f64 = 0.6;
+/// Least scatter of the identity, g; where physics makes gravity turn less than the body.
+const LEAST_IDENTITY: f64 = 0.05;
+const LEAST_IDENTITY_LESS: f64 = 0.09;
+/// A factor below this is a unit.
+const UNIT_BELOW: f64 = 0.1;
+
+/// A map from recorded to true rates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hypothesis {
+    pub(super) map: Matrix3<f64>,
+    /// Factor, where it is one.
+    pub(super) factor: Option<f64>,
+    /// How far from what was recorded: of those that explain the same, the nearest is named.
+    cost: f64,
+}
+
+/// The bank: maps, then factors; the smallest factor stands for no rotation at all.
+pub(super) static BANK: LazyLock<Vec<Hypothesis>> = LazyLock::new(bank);
+
+fn bank() -> Vec<Hypothesis> {
+    let signs = [1.0, -1.0];
+    let mut maps = Vec::with_capacity(HYPOTHESES);
+    for order in [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ] {
+        for (a, b, c) in signs
+            .into_iter()
+            .flat_map(|a| signs.map(|b| (a, b)))
+            .flat_map(|(a, b)| signs.map(|c| (a, b, c)))
+        {
+            let mut map = Matrix3::zeros();
+            for (row, (column, sign)) in order.into_iter().zip([a, b, c]).enumerate() {
+                map[(row, column)] = sign;
+            }
+            let changed: f64 = (map - Matrix3::identity())
+                .iter()
+                .map(|e: &f64| e.abs())
+                .sum();
+            maps.push(Hypothesis {
+                map,
+                factor: None,
+                cost: if changed == 0.0 { 0.0 } else { 1.0 + changed },
+            });
+        }
+    }
+    maps.sort_by(|some, other| some.cost.total_cmp(&other.cost));
+    maps.extend(EXPONENTS.filter(|k| *k != 0).map(|k| {
+        let factor = RATIO.powi(k);
+        Hypothesis {
+            map: Matrix3::from_diagonal_element(factor),
+            factor: Some(factor),
+            cost: 1.5 + 0.5 * factor.ln().abs(),
+        }
+    }));
+    maps
+}
+
+/// Bias and scatter of some hypotheses, segment after segment.
+#[derive(Clone, Debug)]
+pub(super) struct Residuals {
+    normal: Vec<Matrix3<f64>>,
+    slope: Vec<Vector3<f64>>,
+    count: usize,
+}
+
+impl Residuals {
+    pub(super) fn new(hypotheses: usize) -> Residuals {
+        Residuals {
+            normal: vec![Matrix3::zeros(); hypotheses],
+            slope: vec![Vector3::zeros(); hypotheses],
+            count: 0,
+        }
+    }
+
+    /// Scatter of gravity in a segment under each hypothesis with the bias that suits it best so far, g^2.
+    pub(super) fn push(&mut self, segment: &Segment) -> Vec<f64> {
+        // What is older than the memory counts less and less: a bias changes.
+        let kept = match self.count < MEMORY {
+            true => 1.0,
+            false => 1.0 - 1.0 / MEMORY as f64,
+        };
+        self.count += 1;
+        let prior = Matrix3::from_diagonal_element(1e-4 / segment.bias_sigma.powi(2));
+        let sums = self.normal.iter_mut().zip(&mut self.slope);
+        sums.zip(BANK.iter())
+            .map(|((normal, slope), hypothesis)| {
+                let found = segment.scatter::<3>(&hypothesis.map, &[], &Vector3::zeros());
+                let weight = 1.0 / (1.0 + found.s / 1e-3);
+                *normal = *normal * kept + found.a * weight;
+                *slope = *slope * kept + found.b * weight;
+                let inverse = (*normal + prior).try_inverse();
+                let bias = inverse.map_or_else(Vector3::zeros, |inverse| inverse * *slope);
+                found.at(&bias).max(1e-8)
+            })
+            .collect()
+    }
+}
+
+/// Answer of the bank.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Answer {
+    /// The true rates are a signed map of the recorded ones; recorded axes whose place is decided.
+    Map([bool; 3]),
+    /// They are about this factor of them.
+    Factor,
+    /// No map makes gravity stand still, and no rotation at all is as good.
+    Contradiction,
+}
+
+/// Verdict of the bank.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Verdict {
+    pub(super) answer: Answer,
+    /// Place in the bank.
+    pub(super) hypothesis: usize,
+    /// Logarithm of how much better it is.
+    pub(super) evidence: f64,
+    /// Median scatter of gravity as recorded, and under the hypothesis, g.
+    pub(super) identity: f64,
+    pub(super) found: f64,
+    /// Share of the telling segments that agree, and their number.
+    pub(super) share: f64,
+    pub(super) segments: usize,
+}
+
+/// Evidence for each hypothesis against the identity.
+#[derive(Clone, Debug)]
+pub(super) struct Evidence {
+    residuals: Residuals,
+    rows: VecDeque<Vec<f64>>,
+    sums: Vec<f64>,
+}
+
+impl Evidence {
+    pub(super) fn new() -> Evidence {
+        Evidence {
+            residuals: Residuals::new(HYPOTHESES),
+            rows: VecDeque::new(),
+            sums: vec![0.0; HYPOTHESES],
+        }
+    }
+
+    /// Takes a segment.
+    pub(super) fn push(&mut self, segment: &Segment) {
+        let row = self.residuals.push(segment);
+        for (h, sum) in self.sums.iter_mut().enumerate() {
+            *sum += said(&row, h);
+        }
+        self.rows.push_back(row);
+        if self.rows.len() > MEMORY
+            && let Some(oldest) = self.rows.pop_front()
+        {
+            for (h, sum) in self.sums.iter_mut().enumerate() {
+                *sum -= said(&oldest, h);
+            }
+        }
+    }
+
+    /// What may be said by now; `None` where nothing may.
+    pub(super) fn verdict(&self) -> Option<Verdict> {
+        let best = self.sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if self.rows.len() < LEAST_SEGMENTS || best < LEAST_EVIDENCE || !best.is_finite() {
+            return None;
+        }
+        let near = self.near(best);
+        let chosen = self.simplest(&near)?;
+        let telling: Vec<&Vec<f64>> = self
+            .rows
+            .iter()
+            .filter(|row| said(row, chosen).abs() > TELLING)
+            .collect();
+        if telling.len() < LEAST_SEGMENTS {
+            return None;
+        }
+        let agree = telling.iter().filter(|row| said(row, chosen) > 0.0).count();
+        let (identity, found) = (median(&telling, 0), median(&telling, chosen));
+        let share = agree as f64 / telling.len() as f64;
+        let (evidence, nothing) = (self.sums[chosen], self.sums[MAPS]);
+        let has_peak = evidence - nothing >= (0.15 * evidence).max(4.0);
+        let factor = BANK.get(chosen)?.factor;
+        let least = match factor {
+            None => LEAST_IDENTITY,
+            Some(factor) if factor > 1.0 || (factor < UNIT_BELOW && has_peak) => LEAST_IDENTITY,
+            Some(_) => LEAST_IDENTITY_LESS,
+        };
+        let is_clear = evidence >= LEAST_EVIDENCE
+            && share >= LEAST_SHARE
+            && found <= LARGEST_FOUND
+            && found <= LARGEST_RATIO * identity
+            && identity >= least;
+        is_clear.then(|| Verdict {
+            answer: match (has_peak, factor) {
+                (false, _) => Answer::Contradiction,
+                (true, Some(_)) => Answer::Factor,
+                (true, None) => decided(&near, chosen).map_or(Answer::Contradiction, Answer::Map),
+            },
+            hypothesis: chosen,
+            evidence,
+            identity,
+            found,
+            share,
+            segments: telling.len(),
+        })
+    }
+
+    /// Hypotheses about as good as the best.
+    fn near(&self, best: f64) -> Vec<usize> {
+        let least = best - (0.05 * best).max(2.0);
+        let sums = self.sums.iter().enumerate();
+        sums.filter(|(_, sum)| **sum >= least)
+            .map(|(h, _)| h)
+            .collect()
+    }
+
+    /// The simplest of them; of factors the best there is.
+    fn simplest(&self, near: &[usize]) -> Option<usize> {
+        let order = |a: &usize, b: &usize| {
+            let cost = |h: usize| {
+                BANK.get(h)
+                    .map_or(f64::INFINITY, |hypothesis| hypothesis.cost)
+            };
+            let by_cost = cost(*a).total_cmp(&cost(*b));
+            by_cost.then_with(|| self.sums[*b].total_cmp(&self.sums[*a]))
+        };
+        let chosen = near.iter().copied().min_by(order)?;
+        if chosen < MAPS {
+            return Some(chosen);
+        }
+        let mut best = MAPS;
+        for h in MAPS..self.sums.len() {
+            if self.sums[h] > self.sums[best] {
+                best = h;
+            }
+        }
+        Some(best)
+    }
+}
+
+/// What a segment says for a hypothesis against the identity.
+fn said(row: &[f64], h: usize) -> f64 {
+    let of = |h: usize| row.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
+    (of(0) / of(h)).ln().clamp(-CLIP, CLIP)
+}
+
+/// Median scatter under a hypothesis, g.
+fn median(rows: &[&Vec<f64>], h: usize) -> f64 {
+    let mut all: Vec<f64> = rows.iter().filter_map(|row| row.get(h).copied()).collect();
+    all.sort_by(f64::total_cmp);
+    let at = |n: usize| all.get(n).copied().unwrap_or(0.0);
+    let middle = all.len() / 2;
+    let median = match all.len() % 2 {
+        1 => at(middle),
+        _ => 0.5 * (at(middle.saturating_sub(1)) + at(middle)),
+    };
+    median.sqrt()
+}
+
+/// Recorded axes whose place is the same in all maps that are near; `None` where none of them is changed.
+fn decided(near: &[usize], chosen: usize) -> Option<[bool; 3]> {
+    let map_of = |h: &usize| BANK.get(*h).map(|hypothesis| hypothesis.map);
+    let named = map_of(&chosen)?;
+    let maps = || near.iter().filter(|h| **h < MAPS).filter_map(map_of);
+    let is_decided = |axis: usize| maps().all(|map| map.column(axis) == named.column(axis));
+    let decided = [0, 1, 2].map(is_decided);
+    let is_changed = |axis: usize| named.column(axis) != Matrix3::<f64>::identity().column(axis);
+    (0..3)
+        .any(|axis| decided[axis] && is_changed(axis))
+        .then_some(decided)
+}

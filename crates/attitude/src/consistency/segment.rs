@@ -1,0 +1,242 @@
+//! Blocks of four seconds -> how much gravity is seen to wander under a map of the gyro. Pure.
+//!
+//! A stage of its own because it is the whole measurement: a map of the gyro is integrated, forces are averaged in the
+//! integrated frame, and what their means differ by is no gravity. What a lever arm explains is taken out.
+//!
+//! The derivation is in `docs/theory/consistency.md`.
+
+use super::blocks::Block;
+use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, Vector3};
+use std::f64::consts::PI;
+
+/// Length of a segment, s.
+pub(super) const SEGMENT_SECS: f64 = 4.0;
+/// Windows in a segment, half overlapped.
+const WINDOWS: usize = 3;
+/// Half the width of a window, s.
+const HALF_WIDTH: f64 = SEGMENT_SECS / (WINDOWS + 1) as f64;
+/// Standard gravity, m/s^2.
+const GRAVITY: f64 = 9.806_65;
+/// Scatter of a window's force, g, and prior of a lever arm, m.
+const SIGMA_FORCE: f64 = 0.03;
+const SIGMA_LEVER: f64 = 0.5;
+/// Least turn, rad, and least scatter of the force, g, of a segment that moves.
+const LEAST_TURN: f64 = 0.35;
+const LEAST_SCATTER: f64 = 0.05;
+/// Turn (rad in whatever unit) and squared scatter that no sensor makes.
+const MOST: f64 = 1e6;
+/// Rows of the residual.
+const ROWS: usize = 3 * WINDOWS;
+
+/// A block with its weights in the windows.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    /// Integral of the rate, bias of rest taken out, rad.
+    angle: Vector3<f64>,
+    secs: f64,
+    /// Mean force, g.
+    force: Vector3<f64>,
+    /// Share in the mean of each window.
+    weight: [f64; WINDOWS],
+    /// Second derivative of the same by gravity, 1/m.
+    curvature: [f64; WINDOWS],
+}
+
+/// Four seconds of a run.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pieces: Vec<Piece>,
+    /// Sigma of what is left of the bias, rad/s.
+    pub(super) bias_sigma: f64,
+}
+
+/// Scatter of gravity as a quadratic of what is not known: `s - 2 b p + p A p`, g^2.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scatter<const P: usize> {
+    /// Value at zero.
+    pub(super) s: f64,
+    /// Half the slope, negative.
+    pub(super) b: SVector<f64, P>,
+    /// Curvature.
+    pub(super) a: SMatrix<f64, P, P>,
+}
+
+impl<const P: usize> Scatter<P> {
+    /// Value at `p`.
+    pub(super) fn at(&self, p: &SVector<f64, P>) -> f64 {
+        self.s - 2.0 * self.b.dot(p) + p.dot(&(self.a * p))
+    }
+}
+
+impl Segment {
+    /// Segment of `blocks`, whose force is `gravity` long at rest, and of a gyro with this bias.
+    pub(super) fn new(
+        blocks: &[Block],
+        gravity: f64,
+        bias: Option<Vector3<f64>>,
+        bias_sigma: f64,
+    ) -> Segment {
+        let origin = blocks
+            .first()
+            .map_or_else(Default::default, |block| block.start);
+        let taken = bias.unwrap_or_else(Vector3::zeros);
+        let mut pieces: Vec<Piece> = blocks
+            .iter()
+            .map(|block| Piece {
+                angle: block.angle - taken * block.secs(),
+                secs: block.secs(),
+                force: block.force / gravity,
+                weight: [0.0; WINDOWS],
+                curvature: [0.0; WINDOWS],
+            })
+            .collect();
+        let middle =
+            |block: &Block| 0.5 * (block.start.secs_since(origin) + block.end.secs_since(origin));
+        let middles: Vec<f64> = blocks.iter().map(middle).collect();
+        (0..WINDOWS).for_each(|k| weigh(&mut pieces, &middles, k));
+        Segment { pieces, bias_sigma }
+    }
+
+    /// Whether the gyro turned, or the force changed, enough to say something.
+    pub(super) fn moves(&self) -> bool {
+        let turned: f64 = self.pieces.iter().map(|piece| piece.angle.norm()).sum();
+        let mean_of = |k: usize| {
+            let pieces = self.pieces.iter();
+            pieces.fold(Vector3::zeros(), |sum, piece| {
+                sum + piece.force * piece.weight[k]
+            })
+        };
+        let means: [Vector3<f64>; WINDOWS] = std::array::from_fn(mean_of);
+        let mean = means.iter().sum::<Vector3<f64>>() / WINDOWS as f64;
+        let squares: f64 = means.iter().map(|m| (m - mean).norm_squared()).sum();
+        let is_believed = turned < MOST && squares < MOST;
+        is_believed && (turned > LEAST_TURN || (squares / WINDOWS as f64).sqrt() > LEAST_SCATTER)
+    }
+
+    /// Scatter of gravity where the true rate is `map` times the recorded one and `bias` (rad/s as recorded); `p` is
+    /// the bias left, rad/s of the true rate, and a share of each of `directions`, of which there are P - 3.
+    pub(super) fn scatter<const P: usize>(
+        &self,
+        map: &Matrix3<f64>,
+        directions: &[Matrix3<f64>],
+        bias: &Vector3<f64>,
+    ) -> Scatter<P> {
+        let mut attitude = Quaternion::identity();
+        let mut turned_by: SMatrix<f64, 3, P> = SMatrix::zeros();
+        let mut force = [Vector3::zeros(); WINDOWS];
+        let mut lever = [Matrix3::zeros(); WINDOWS];
+        let mut slope = [SMatrix::<f64, 3, P>::zeros(); WINDOWS];
+        for piece in &self.pieces {
+            let angle = piece.angle + bias * piece.secs;
+            let half = half_turn(&(map * angle));
+            attitude *= half;
+            let c = matrix(&attitude);
+            let f = c * piece.force;
+            let mut step: SMatrix<f64, 3, P> = SMatrix::zeros();
+            step.fixed_columns_mut::<3>(0).copy_from(&(c * piece.secs));
+            for (i, direction) in directions.iter().enumerate() {
+                step.set_column(3 + i, &(c * (direction * angle)));
+            }
+            let middle = turned_by + step * 0.5;
+            turned_by += step;
+            let mut crossed = middle;
+            crossed.column_iter_mut().for_each(|mut column| {
+                let product = column.cross(&f);
+                column.copy_from(&product);
+            });
+            for k in (0..WINDOWS).filter(|k| piece.weight[*k] != 0.0) {
+                force[k] += f * piece.weight[k];
+                lever[k] += c * piece.curvature[k];
+                slope[k] += crossed * piece.weight[k];
+            }
+            attitude *= half;
+        }
+        without_lever_arm(force, lever, slope)
+    }
+}
+
+/// Puts in the weights of window `k`: Hann, of sum 1, and its second derivative, of sum 0.
+fn weigh(pieces: &mut [Piece], middles: &[f64], k: usize) {
+    let place = |middle: f64| (middle - (k + 1) as f64 * HALF_WIDTH) / HALF_WIDTH;
+    let within = |(_, middle): &(&mut Piece, &f64)| place(**middle).abs() < 1.0;
+    let mut sum = 0.0;
+    for (piece, middle) in pieces.iter_mut().zip(middles).filter(within) {
+        let cos = (PI * place(*middle)).cos();
+        piece.weight[k] = 0.5 + 0.5 * cos;
+        piece.curvature[k] = -0.5 * (PI / HALF_WIDTH).powi(2) * cos;
+        sum += piece.weight[k];
+    }
+    let (mut curvature, mut n) = (0.0, 0.0);
+    for (piece, _) in pieces.iter_mut().zip(middles).filter(within) {
+        piece.weight[k] /= sum;
+        piece.curvature[k] /= sum * GRAVITY;
+        curvature += piece.curvature[k];
+        n += 1.0;
+    }
+    for (piece, _) in pieces.iter_mut().zip(middles).filter(within) {
+        piece.curvature[k] -= curvature / n;
+    }
+}
+
+/// Rotation by half of the vector.
+fn half_turn(angle: &Vector3<f64>) -> Quaternion<f64> {
+    let quarter = angle.norm() / 4.0;
+    let by = match quarter > 1e-4 {
+        true => quarter.sin() / quarter,
+        false => 1.0 - quarter * quarter / 6.0,
+    };
+    Quaternion::from_parts(quarter.cos(), angle * (by / 4.0))
+}
+
+fn matrix(q: &Quaternion<f64>) -> Matrix3<f64> {
+    let (w, x, y, z) = (q.w, q.i, q.j, q.k);
+    Matrix3::new(
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )
+}
+
+/// Means of the windows less their mean, less what a lever arm explains.
+fn without_lever_arm<const P: usize>(
+    force: [Vector3<f64>; WINDOWS],
+    lever: [Matrix3<f64>; WINDOWS],
+    slope: [SMatrix<f64, 3, P>; WINDOWS],
+) -> Scatter<P> {
+    let share = 1.0 / WINDOWS as f64;
+    let mean_force = force.iter().sum::<Vector3<f64>>() * share;
+    let mean_lever = lever.iter().sum::<Matrix3<f64>>() * share;
+    let mean_slope = slope.iter().sum::<SMatrix<f64, 3, P>>() * share;
+    let mut r: SVector<f64, ROWS> = SVector::zeros();
+    let mut d: SMatrix<f64, ROWS, 3> = SMatrix::zeros();
+    let mut j: SMatrix<f64, ROWS, P> = SMatrix::zeros();
+    for k in 0..WINDOWS {
+        r.fixed_rows_mut::<3>(3 * k)
+            .copy_from(&(force[k] - mean_force));
+        d.fixed_rows_mut::<3>(3 * k)
+            .copy_from(&(lever[k] - mean_lever));
+        j.fixed_rows_mut::<3>(3 * k)
+            .copy_from(&(mean_slope - slope[k]));
+    }
+    let prior = (SIGMA_FORCE / SIGMA_LEVER).powi(2);
+    let normal = d.transpose() * d + Matrix3::from_diagonal_element(prior);
+    let (mut s, mut b, mut a) = (r.norm_squared(), j.transpose() * r, j.transpose() * j);
+    // Positive definite by its diagonal; a number that is none leaves all as it is, and is none itself.
+    if let Some(inverse) = normal.try_inverse() {
+        let (by_force, by_slope) = (d.transpose() * r, d.transpose() * j);
+        s -= by_force.dot(&(inverse * by_force));
+        b -= by_slope.transpose() * (inverse * by_force);
+        a -= by_slope.transpose() * (inverse * by_slope);
+    }
+    Scatter {
+        s: s * share,
+        b: b * share,
+        a: a * share,
+    }
+}

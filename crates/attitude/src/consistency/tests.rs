@@ -1,0 +1,220 @@
+//! The same numbers as an independent reference (numpy), on motions that both make.
+#![allow(clippy::unwrap_used)]
+
+mod simulation;
+
+use self::simulation::{Sample, roll_only, simulate};
+use super::*;
+use crate::propagate::shared_data;
+use crate::quaternion::BodyRate;
+use serde_json::Value;
+use std::fs;
+
+/// Printed with nine digits.
+const ROUNDED: f64 = 1e-6;
+
+fn golden() -> Value {
+    let path = shared_data::shared("oracle/consistency/golden.json").unwrap();
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn numbers(value: &Value, out: &mut Vec<f64>) {
+    match value {
+        Value::Array(all) => all.iter().for_each(|one| numbers(one, out)),
+        other => out.push(other.as_f64().unwrap()),
+    }
+}
+
+fn close<'a>(name: &str, value: &Value, ours: impl IntoIterator<Item = &'a f64>) {
+    let mut theirs = Vec::new();
+    numbers(value, &mut theirs);
+    let ours: Vec<f64> = ours.into_iter().copied().collect();
+    assert_eq!(theirs.len(), ours.len(), "{name}");
+    for (their, our) in theirs.iter().zip(&ours) {
+        let is_near = (their - our).abs() <= ROUNDED * (1.0 + their.abs());
+        assert!(is_near, "{name}: {their} and {our}");
+    }
+}
+
+fn watch(samples: &[Sample], map: &Matrix3<f64>, watch: &mut Consistency) {
+    for (n, sample) in samples.iter().enumerate() {
+        watch.push(&Reading {
+            stamp: Nanos(n as i64 * 20_000_000),
+            gyro: Measured::Rate(BodyRate(map * sample.rate)),
+            force: sample.force,
+        });
+    }
+}
+
+fn watched(samples: &[Sample], map: &Matrix3<f64>) -> Consistency {
+    let mut consistency = Consistency::default();
+    watch(samples, map, &mut consistency);
+    consistency
+}
+
+/// All segments that move.
+fn segments(samples: &[Sample], map: &Matrix3<f64>) -> Vec<Segment> {
+    let mut consistency = Consistency {
+        bank: Some(Evidence::new()),
+        ..Consistency::default()
+    };
+    watch(samples, map, &mut consistency);
+    consistency.kept.into_iter().collect()
+}
+
+fn diagonal(x: f64, y: f64, z: f64) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(x, y, z))
+}
+
+fn every_entry() -> [Matrix3<f64>; 9] {
+    std::array::from_fn(|i| {
+        let mut direction = Matrix3::zeros();
+        direction[(i / 3, i % 3)] = 1.0;
+        direction
+    })
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
+fn the_scatter_of_a_segment_is_that_of_the_reference() {
+    let golden = golden();
+    let samples = simulate(2000, 0.0);
+    let sample = &samples[200];
+    close("rate", &golden["sample_200"]["w"], sample.rate.as_slice());
+    close("force", &golden["sample_200"]["f"], sample.force.as_slice());
+    let segment = &segments(&samples, &Matrix3::identity())[2];
+    let one = |map: &Matrix3<f64>| segment.scatter::<3>(map, &[], &Vector3::zeros());
+    let found = [
+        one(&Matrix3::identity()),
+        one(&diagonal(1.0, 1.0, -1.0)),
+        one(&diagonal(1.25, 1.25, 1.25)),
+    ];
+    let golden = &golden["segment"];
+    close("s", &golden["s"], &found.map(|found| found.s));
+    close("b", &golden["b"], found.iter().flat_map(|found| &found.b));
+    close(
+        "A",
+        &golden["A_identity"],
+        found[0].a.transpose().as_slice(),
+    );
+    let full = segment.scatter::<12>(&Matrix3::identity(), &every_entry(), &Vector3::zeros());
+    close("s of all", &golden["s_full"], &[full.s]);
+    close("b of all", &golden["b_full"], full.b.as_slice());
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
+fn the_bank_says_what_the_reference_says() {
+    let golden = golden();
+    let (still, walking) = (simulate(2000, 0.0), simulate(2000, 2.0));
+    let reversed = diagonal(-1.0, 1.0, 1.0);
+    let all = |factor: f64| Matrix3::from_diagonal_element(factor);
+    for (name, samples, map) in [
+        ("as it is", &still, all(1.0)),
+        ("walking", &walking, all(1.0)),
+        ("-x", &still, reversed),
+        (
+            "y,x,z",
+            &still,
+            Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+        ),
+        ("-x walking", &walking, reversed),
+        ("half", &still, all(0.5)),
+        ("twice", &still, all(2.0)),
+        ("degrees", &still, all(57.29578)),
+        ("roll only, -x", &roll_only(), reversed),
+    ] {
+        let theirs = &golden["verdict"][name];
+        let ours = watched(samples, &map);
+        assert_eq!(theirs["bank"], ours.bank.is_some(), "{name}");
+        assert_eq!(theirs["held"], ours.held, "{name}");
+        let Some(verdict) = ours.bank.as_ref().and_then(Evidence::verdict) else {
+            assert_eq!(theirs["kind"], "none", "{name}");
+            continue;
+        };
+        let (kind, seen) = match verdict.answer {
+            Answer::Map(decided) => ("map", decided),
+            Answer::Factor => ("factor", [false; 3]),
+            Answer::Contradiction => ("contradict", [false; 3]),
+        };
+        let seen = ["x", "y", "z"].into_iter().zip(seen).filter(|(_, is)| *is);
+        let seen: String = seen.map(|(axis, _)| axis).collect();
+        assert_eq!(theirs["kind"], kind, "{name}");
+        assert_eq!(theirs["seen"], seen.as_str(), "{name}");
+        assert_eq!(theirs["h"], verdict.hypothesis, "{name}");
+        assert_eq!(theirs["segments"], verdict.segments, "{name}");
+        for (key, value) in [
+            ("E", verdict.evidence),
+            ("r_identity", verdict.identity),
+            ("r_found", verdict.found),
+            ("share", verdict.share),
+        ] {
+            close(&format!("{name} {key}"), &theirs[key], &[value]);
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
+fn a_refined_map_is_that_of_the_reference() {
+    fn holds<const P: usize>(name: &str, recorded: &Matrix3<f64>, directions: &[Matrix3<f64>]) {
+        let theirs = &golden()["refine"][name];
+        let segments = segments(&simulate(2000, 0.0), recorded);
+        let found = refine::<P>(segments.iter(), &Matrix3::identity(), directions).unwrap();
+        close(name, &theirs["M"], found.map.transpose().as_slice());
+        close(name, &theirs["sigma"], found.sigma.iter().skip(3));
+    }
+    let axes = [0, 1, 2].map(|axis| Vector3::ith(axis, 1.0));
+    holds::<4>("0.8", &diagonal(0.8, 0.8, 0.8), &[Matrix3::identity()]);
+    let axis = nalgebra::Unit::new_normalize(Vector3::new(1.0, 2.0, -2.0));
+    let turned = nalgebra::Rotation3::from_axis_angle(&axis, 15_f64.to_radians());
+    let turns = axes.map(|axis| axis.cross_matrix());
+    holds::<6>("turned by 15 deg", turned.matrix(), &turns);
+    let single = axes.map(|axis| Matrix3::from_diagonal(&axis));
+    holds::<6>("z times 1.3", &diagonal(1.0, 1.0, 1.3), &single);
+}
+
+#[test]
+fn a_disagreement_names_what_cures_it() {
+    let samples = simulate(2000, 2.0);
+    assert_eq!(watched(&samples, &Matrix3::identity()).disagreement(), None);
+    // Recorded x is true -y, and so on.
+    let recorded = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
+    let found = watched(&samples, &recorded).disagreement().unwrap();
+    let Cause::Axes { map, decided } = found.cause else {
+        panic!("{found:?}")
+    };
+    assert_eq!((map.to_string().as_str(), decided), ("ZxY", [true; 3]));
+    assert!(found.recorded > 0.1 && found.cured < 0.01, "{found:?}");
+    for factor in [0.5, 1.7, 16.4 * 57.29578, 1e-3] {
+        let found = watched(&samples, &Matrix3::from_diagonal_element(factor));
+        let found = found.disagreement().unwrap();
+        let Cause::Scale { factor: by, sigma } = found.cause else {
+            panic!("{factor}: {found:?}")
+        };
+        assert!((by * factor - 1.0).abs() < 0.02, "{factor}: {found:?}");
+        assert!(sigma < 0.05 && found.cured < 0.01, "{found:?}");
+    }
+}
+
+#[test]
+fn hostile_readings_are_passed_over_and_memory_stays_bounded() {
+    let samples = simulate(2000, 0.0);
+    let mut consistency = Consistency::default();
+    for round in 0..5 {
+        watch(&samples, &diagonal(-1.0, 1.0, 1.0), &mut consistency);
+        for number in [f64::NAN, f64::INFINITY, 1e300, 0.0] {
+            consistency.push(&Reading {
+                stamp: Nanos(i64::MAX - round),
+                gyro: Measured::Rate(BodyRate(Vector3::repeat(number))),
+                force: Vector3::repeat(number),
+            });
+        }
+    }
+    assert!(consistency.run.len() <= 202 && consistency.kept.len() <= REFINED_BY);
+    assert!(consistency.disagreement().is_some());
+    let mut dead = Consistency::default();
+    let none = vec![Sample::default(); 2000];
+    watch(&none, &Matrix3::identity(), &mut dead);
+    assert_eq!(dead.disagreement(), None);
+}
