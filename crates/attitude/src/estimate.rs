@@ -16,6 +16,7 @@ mod calibrated;
 mod class_pass;
 mod estimator;
 mod first_pass;
+mod gyro_watch;
 mod integrator;
 mod intervals;
 mod kept;

@@ -7,6 +7,7 @@
 mod orientation;
 mod run;
 mod samples;
+mod sensors;
 mod verdicts;
 
 pub use run::of_sensor;
@@ -145,6 +146,7 @@ fn of_run_and_samples(topic: &CheckedTopic) -> Vec<Finding> {
         },
         ..finding
     }));
+    sensors::settle(&mut found);
     found
 }
 

@@ -5,6 +5,7 @@
 
 use super::aiding::{self, Forces};
 use super::anew::Anew;
+use super::gyro_watch::GyroWatch;
 use super::integrator::{Beside, Integrator};
 use super::kept::{Spool, SpoolError};
 use super::meaning::Meaning;
@@ -15,6 +16,7 @@ use super::smoothing::{Recording, Smoothing, Told};
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
+use crate::consistency::Consistency;
 use crate::diagnostic::Diagnostic;
 use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
@@ -38,6 +40,8 @@ pub struct Estimator {
     beside: Vec<(usize, Nanos, Beside)>,
     /// Auxiliary inputs; `None` where nothing of them is used.
     besides: Option<Besides>,
+    /// Watch over the gyro, where somebody wants it; it changes no attitude and is not remembered.
+    watch: Option<GyroWatch>,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
     /// The next sample begins anew.
@@ -229,6 +233,7 @@ impl Estimator {
                 has_field: aiding.settings.has_field,
                 force_scale: None,
             }),
+            watch: None,
             begins_anew: false,
             rates: Vec::new(),
             even: Vec::new(),
@@ -449,6 +454,9 @@ impl Estimator {
             self.rates
                 .extend_from_slice(rates.get(from..place).unwrap_or(&[]));
             self.push_rates(exec);
+            if let (Some(watch), Beside::Force(force)) = (&mut self.watch, &beside) {
+                watch.take_force(stamp, *force);
+            }
             self.integrator.take_beside(stamp, beside);
             from = place;
         }
@@ -458,6 +466,9 @@ impl Estimator {
     }
 
     fn push_rates(&mut self, exec: &impl Executor) {
+        if let Some(watch) = &mut self.watch {
+            watch.push(&self.rates);
+        }
         let rates = match &mut self.regulariser {
             None => &mut self.rates,
             Some(regulariser) => {
@@ -473,6 +484,18 @@ impl Estimator {
         self.integrator.push(rates, exec, &mut self.out);
         self.even.clear();
         self.rates.clear();
+    }
+
+    /// Holds the gyro against the accelerometer from now on, for [`Estimator::consistency`]; `resolved` is that by which
+    /// this was made.
+    pub fn watch_gyro(&mut self, resolved: &Meaning) {
+        self.watch = Some(GyroWatch::new(&resolved.to_body()));
+    }
+
+    /// Gyro against accelerometer as far as was seen; `None` where nobody asked to watch.
+    #[must_use]
+    pub fn consistency(&self) -> Option<&Consistency> {
+        self.watch.as_ref().map(GyroWatch::consistency)
     }
 
     /// Report of conditioning.

@@ -1,10 +1,12 @@
 //! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
-use super::{Finding, Severity, orientation, samples};
+use super::{Finding, Severity, orientation, samples, sensors};
 use crate::summary::aid::Frozen;
 use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
+use strapd_attitude::consistency::Consistency;
+use strapd_attitude::estimate::{Meaning, Plan};
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
@@ -35,6 +37,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) frozen_field: Option<Frozen>,
     /// Frames of other bodies on the topic, and how many messages named them.
     pub(crate) left_out: &'a [(String, u64)],
+    /// Gyro held against accelerometer, with what the samples were taken for.
+    pub(crate) gyro: Option<(&'a Consistency, &'a Plan, &'a Meaning)>,
     /// Orientations that were compared with; `None` where none were to be.
     pub(crate) references: Option<u64>,
 }
@@ -117,6 +121,8 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         out.push(no_reference(references));
     }
     out.extend(orientation::of_run(summary));
+    out.extend(noted.gyro.and_then(sensors::disagreement));
+    sensors::settle(&mut out);
     out
 }
 

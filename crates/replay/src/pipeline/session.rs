@@ -144,7 +144,8 @@ impl Topic {
             topic: found.name.clone(),
             what,
         };
-        let estimator = Estimator::new(plan, &found.resolved, &prepared).map_err(refuse)?;
+        let mut estimator = Estimator::new(plan, &found.resolved, &prepared).map_err(refuse)?;
+        estimator.watch_gyro(&found.resolved);
         let against = against
             .then(|| AgainstRecorded::new(plan, &found.resolved, &prepared))
             .transpose()

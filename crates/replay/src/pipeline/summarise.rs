@@ -92,6 +92,10 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             stamps_carried: topic.noticed.stamps_carried.load(Ordering::Relaxed),
             left_out: &topic.noticed.left_out(),
             frozen_field: topic.field.as_ref().and_then(FieldWatch::frozen),
+            gyro: topic
+                .estimator
+                .consistency()
+                .map(|consistency| (consistency, &run.plan, &topic.resolved)),
             references: topic.against.as_ref().map(|a| a.references() as u64),
         },
     );

@@ -1,0 +1,239 @@
+//! Sensors held against each other -> findings, with the setting that cures what they disagree about. Pure.
+//!
+//! Apart from the rules about samples because it needs the samples integrated; what is measured is in
+//! `strapd_attitude::consistency`. A cure is advised where the recording, integrated with it, agrees.
+
+use super::{Finding, Severity};
+use crate::summary::significant;
+use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::consistency::{Cause, Consistency, Disagreement};
+use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::frames::AxisMap;
+use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
+
+/// Codes of the findings here that name a cause.
+const AXES: &str = "gyro-axes";
+const SCALE: &str = "gyro-scale";
+/// Findings that have only a guess where a cause is named.
+const GUESSES: [&str; 2] = ["unit-against-gravity", "unit-degrees"];
+/// Findings that rates in a wrong unit bring with them.
+const BY_UNIT: [&str; 2] = ["under-sampled", "large-turn-per-step"];
+/// Largest sigma of a factor that is more than an order of size.
+const KNOWN: f64 = 0.05;
+/// A known factor is as far as this from the measured one, in sigmas and as a share; a sigma holds to a factor of four.
+const SIGMAS: f64 = 3.0;
+const NEAR: std::ops::Range<f64> = 0.02..0.06;
+/// A factor below this, or above its inverse, is another unit.
+const UNIT: f64 = 0.1;
+/// Scatter of gravity of a cure, by that as recorded.
+const CURED: f64 = 0.6;
+/// Counts per deg/s, and ranges in deg/s, of common sensors: InvenSense and Bosch, then ST by its mdps per count.
+const COUNTS: [(f64, u32); 8] = [
+    (16.4, 2000),
+    (32.8, 1000),
+    (65.5, 500),
+    (131.0, 250),
+    (1000.0 / 70.0, 2000),
+    (1000.0 / 35.0, 1000),
+    (1000.0 / 17.5, 500),
+    (1000.0 / 8.75, 250),
+];
+
+/// What a factor of the rates is known as.
+struct Named {
+    /// True rates by those as they were taken.
+    factor: f64,
+    words: String,
+    cure: Choice,
+}
+
+/// Finding that gyro and accelerometer speak of different bodies.
+pub(super) fn disagreement(
+    (consistency, plan, resolved): (&Consistency, &Plan, &Meaning),
+) -> Option<Finding> {
+    let found = consistency.disagreement()?;
+    let finding = match found.cause {
+        Cause::Axes { map, decided } => of_axes(&found, (map, decided), plan),
+        Cause::Scale { factor, sigma } => of_scale(
+            (&found, consistency),
+            (factor, sigma),
+            (plan, resolved.unit),
+        ),
+        Cause::Unknown => Finding::new(
+            Severity::Warning,
+            "gyro-against-gravity",
+            format!(
+                "gravity wanders by {} g as the gyro turns, and no map of its axes explains it",
+                significant(found.recorded, 2)
+            ),
+        )
+        .advise("the rates are wrong, or gravity stays with the body (aircraft, pendulum)"),
+    };
+    Some(
+        finding
+            .with("scatter_g", found.recorded)
+            .with("segments", found.segments),
+    )
+}
+
+fn of_axes(found: &Disagreement, (map, decided): (AxisMap, [bool; 3]), plan: &Plan) -> Finding {
+    let names = map.to_string();
+    let turned: Vec<String> = ["x", "y", "z"]
+        .into_iter()
+        .zip(names.chars())
+        .filter(|(axis, letter)| {
+            let place = "xyz".find(letter.to_ascii_lowercase());
+            let is_decided = place.and_then(|at| decided.get(at)).copied() == Some(true);
+            is_decided && *letter != axis.chars().next().unwrap_or_default().to_ascii_uppercase()
+        })
+        .map(|(axis, letter)| {
+            let sign = if letter.is_ascii_lowercase() { "-" } else { "" };
+            format!(
+                "about {axis} is the recorded {sign}{}",
+                letter.to_ascii_lowercase()
+            )
+        })
+        .collect();
+    Finding::new(
+        Severity::Error,
+        AXES,
+        format!(
+            "gyro and accelerometer disagree: the true rate {}",
+            turned.join(", ")
+        ),
+    )
+    .with("map", names)
+    .with("scatter_cured_g", found.cured)
+    .advise(tried(found.recorded, found.cured, "the gyro's axes mapped"))
+    .help([GYRO_AXES.to(map.after(plan.gyro_axes))])
+}
+
+fn of_scale(
+    (found, consistency): (&Disagreement, &Consistency),
+    (factor, sigma): (f64, f64),
+    (plan, unit): (&Plan, GyroUnit),
+) -> Finding {
+    let is_known = sigma < KNOWN;
+    let times = match is_known {
+        true => format!(
+            "{} (+- {})",
+            significant(factor, 3),
+            significant(factor * sigma.max(1e-3), 1)
+        ),
+        false => format!("about {}", significant(factor, 1)),
+    };
+    let finding = |words: &str| {
+        Finding::new(
+            Severity::Error,
+            SCALE,
+            format!(
+                "gyro and accelerometer disagree: true rates are {times} of the recorded{words}"
+            ),
+        )
+        .with("factor", factor)
+        .with("sigma", factor * sigma)
+    };
+    if !is_known {
+        return finding("").advise("give the gyro's unit, or its scale");
+    }
+    let near: Vec<Named> = named(plan, unit)
+        .into_iter()
+        .filter(|named| {
+            let off = (named.factor / factor - 1.0).abs();
+            off <= (SIGMAS * sigma).clamp(NEAR.start, NEAR.end)
+        })
+        .filter_map(|named| {
+            let cured = consistency.scatter_by(named.factor)?;
+            (cured <= CURED * found.recorded).then_some(named)
+        })
+        .collect();
+    if near.is_empty() {
+        let scaled = scaled(plan, factor);
+        return finding("")
+            .with("scatter_cured_g", found.cured)
+            .advise(tried(found.recorded, found.cured, "the rates scaled"))
+            .help([scaled]);
+    }
+    let words: Vec<&str> = near.iter().map(|named| named.words.as_str()).collect();
+    let all = finding(&format!(": {}", words.join(", or ")))
+        .with("scatter_cured_g", found.cured)
+        .advise(tried(found.recorded, found.cured, "the rates scaled"));
+    near.into_iter()
+        .fold(all, |all, named| all.help([named.cure]))
+}
+
+/// Factors that rates are off by, other than by accident.
+fn named(plan: &Plan, taken: GyroUnit) -> Vec<Named> {
+    let mut all = Vec::new();
+    if plan.gyro_scale == [1.0; 3] {
+        let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad];
+        all.extend(
+            units
+                .into_iter()
+                .filter(|unit| *unit != taken)
+                .map(|unit| Named {
+                    factor: unit.to_rad() / taken.to_rad(),
+                    words: format!("they look like {}/s", unit.name()),
+                    cure: GYRO_UNIT.to(unit.name()),
+                }),
+        );
+    }
+    for (per_degree, range) in COUNTS {
+        let factor = 1_f64.to_radians() / per_degree / taken.to_rad();
+        all.push(Named {
+            factor,
+            words: format!("counts of a range of {range} deg/s"),
+            cure: scaled(plan, factor),
+        });
+    }
+    for (factor, words) in [(2.0, "half"), (0.5, "twice")] {
+        all.push(Named {
+            factor,
+            words: format!("read with {words} of its range"),
+            cure: scaled(plan, factor),
+        });
+    }
+    all
+}
+
+/// Scale that is so many times that of the plan.
+fn scaled(plan: &Plan, factor: f64) -> Choice {
+    let factors = plan.gyro_scale.map(|own| significant(own * factor, 4));
+    let [x, y, z] = &factors;
+    GYRO_SCALE.to(match x == y && y == z {
+        true => x.clone(),
+        false => factors.join(","),
+    })
+}
+
+/// Outcome of integrating the recording with a cure.
+fn tried(recorded: f64, cured: f64, what: &str) -> String {
+    format!(
+        "gravity wanders by {} g as recorded, by {} g with {what}",
+        significant(recorded, 2),
+        significant(cured, 1)
+    )
+}
+
+/// Leaves of several findings about one cause the one that knows it best.
+pub(super) fn settle(found: &mut Vec<Finding>) {
+    let Some(cause) = found.iter().find(|f| [AXES, SCALE].contains(&f.code)) else {
+        return;
+    };
+    let (is_scale, cures) = (cause.code == SCALE, cause.help.clone());
+    let says_the_same = |f: &Finding| GUESSES.contains(&f.code) && f.help == cures;
+    if is_scale && found.iter().any(says_the_same) {
+        // The words that were there before.
+        found.retain(|f| f.code != SCALE && (!GUESSES.contains(&f.code) || f.help == cures));
+        return;
+    }
+    let factor = cause
+        .evidence
+        .get("factor")
+        .and_then(serde_json::Value::as_f64);
+    let is_unit = factor.is_some_and(|factor| !(UNIT..1.0 / UNIT).contains(&factor));
+    found.retain(|f| !GUESSES.contains(&f.code) && !(is_unit && BY_UNIT.contains(&f.code)));
+}
+
+#[cfg(test)]
+mod tests;

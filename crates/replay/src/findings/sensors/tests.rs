@@ -1,0 +1,171 @@
+//! Faults of one sensor put into a clean motion: each is found, its cure cures it, and the clean motion has none.
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use crate::pipeline::samples::estimate;
+use nalgebra::{Matrix3, Vector3};
+use strapd_attitude::estimate::settings::{Value, defaults, row};
+use strapd_attitude::record::{Nanos, RawSample};
+use strapd_attitude::setting::BODY;
+use strapd_bodies::motion::BandLimited;
+
+const RATE_HZ: i64 = 50;
+
+/// Half a minute of a body that rotates about every axis after 2 s of rest, and gravity's reaction alone.
+fn clean() -> Vec<RawSample> {
+    let mut motion = BandLimited::random(3, 0.8, 1.5, 6).unwrap();
+    let step = 1_000_000_000 / RATE_HZ;
+    let sample = |k: i64| {
+        let moving = (k - 2 * RATE_HZ).max(0);
+        let spin = motion.at_nanos((moving * step) as u64);
+        let up = spin.q_nb.to_dcm().as_matrix().transpose() * Vector3::z();
+        RawSample {
+            header: Some(Nanos(1_700_000_000_000_000_000 + k * step)),
+            log: Nanos(1_700_000_000_000_000_000 + k * step),
+            gyro: Some(match moving {
+                0 => [0.0; 3],
+                _ => spin.w_nb_b.into(),
+            }),
+            accel: Some((up * 9.80665).into()),
+            ..RawSample::default()
+        }
+    };
+    (0..32 * RATE_HZ).map(sample).collect()
+}
+
+fn by_gyro(samples: &[RawSample], map: &Matrix3<f64>) -> Vec<RawSample> {
+    let mapped = |raw: &RawSample| RawSample {
+        gyro: raw.gyro.map(|v| (map * Vector3::from(v)).into()),
+        ..*raw
+    };
+    samples.iter().map(mapped).collect()
+}
+
+fn found(samples: &[RawSample], given: &[Choice]) -> Vec<Finding> {
+    let mut plan = defaults();
+    for choice in given {
+        let row = row(choice.setting.name()).unwrap();
+        row.apply(&mut plan, &Value::Text(&choice.value)).unwrap();
+    }
+    let summary = estimate(&plan, samples.iter().copied(), |_| Ok::<(), ()>(()));
+    let codes = [
+        AXES,
+        SCALE,
+        "gyro-against-gravity",
+        "unit-degrees",
+        "under-sampled",
+    ];
+    let mut all = summary.unwrap().findings;
+    all.retain(|finding| codes.contains(&finding.code));
+    all
+}
+
+#[test]
+fn axes_of_the_gyro_are_named_and_the_map_that_is_advised_cures_them() {
+    let clean = clean();
+    assert_eq!(found(&clean, &[]), []);
+    let exchanged = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let cyclic = Matrix3::new(0.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let reversed = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
+    for (recorded, words) in [
+        (
+            exchanged,
+            "the true rate about x is the recorded y, about y is the recorded x",
+        ),
+        (reversed, "the true rate about z is the recorded -z"),
+        (
+            cyclic,
+            "about x is the recorded y, about y is the recorded -z, about z is the recorded -x",
+        ),
+    ] {
+        let bad = by_gyro(&clean, &recorded);
+        // However the body is mounted, and whatever map is given already.
+        for given in [
+            vec![],
+            vec![BODY.to("frd")],
+            vec![BODY.to("YxZ"), GYRO_AXES.to("zXY")],
+        ] {
+            let is_mapped = given.len() > 1;
+            let all = found(&bad, &given);
+            let [finding] = all.as_slice() else {
+                panic!("{given:?}: {all:?}")
+            };
+            assert_eq!((finding.code, finding.severity), (AXES, Severity::Error));
+            assert!(is_mapped || finding.what.contains(words), "{finding:?}");
+            let mut cured = given;
+            cured.retain(|choice| choice.setting != GYRO_AXES);
+            cured.push(finding.help[0][0].clone());
+            assert_eq!(found(&bad, &cured), [], "{cured:?}");
+        }
+    }
+}
+
+#[test]
+fn the_scale_of_the_gyro_is_named_and_what_is_advised_cures_it() {
+    let clean = clean();
+    let deg = 1_f64.to_degrees();
+    for (factor, words, cure) in [
+        (0.5, "read with half of its range", GYRO_SCALE.to("2.000")),
+        (2.0, "read with twice of its range", GYRO_SCALE.to("0.5000")),
+        (deg, "they look like deg/s", GYRO_UNIT.to("deg")),
+        (1000.0, "they look like mrad/s", GYRO_UNIT.to("mrad")),
+        (
+            16.4 * deg,
+            "counts of a range of 2000 deg/s",
+            GYRO_SCALE.to("0.001064"),
+        ),
+        (
+            131.0 * deg,
+            "counts of a range of 250 deg/s",
+            GYRO_SCALE.to("0.0001332"),
+        ),
+    ] {
+        let bad = by_gyro(&clean, &Matrix3::from_diagonal_element(factor));
+        let all = found(&bad, &[]);
+        let cause = all.iter().find(|finding| finding.code == SCALE);
+        let cause = cause.unwrap_or_else(|| panic!("{factor}: {all:?}"));
+        assert!(cause.what.contains(words), "{cause:?}");
+        assert_eq!(cause.help, [[cure.clone()]], "{cause:?}");
+        assert_eq!(found(&bad, &[cure]), []);
+    }
+    let bad = by_gyro(&clean, &Matrix3::from_diagonal_element(0.7));
+    let all = found(&bad, &[]);
+    let [finding] = all.as_slice() else {
+        panic!("{all:?}")
+    };
+    let [[cure]] = finding.help.iter().map(Vec::as_slice).collect::<Vec<_>>()[..] else {
+        panic!("{finding:?}")
+    };
+    let advised: f64 = cure.value.parse().unwrap();
+    assert!((advised * 0.7 - 1.0).abs() < 0.02, "{finding:?}");
+}
+
+#[test]
+fn a_guess_gives_way_to_a_cause_and_words_that_agree_stay() {
+    let guess = |unit: &str| {
+        Finding::new(Severity::Error, "unit-against-gravity", "").help([GYRO_UNIT.to(unit)])
+    };
+    let cause = |cure: Choice| {
+        Finding::new(Severity::Error, SCALE, "")
+            .with("factor", 1e-3)
+            .help([cure])
+    };
+    let codes = |mut all: Vec<Finding>| {
+        settle(&mut all);
+        all.iter().map(|finding| finding.code).collect::<Vec<_>>()
+    };
+    let steps = || Finding::new(Severity::Error, "under-sampled", "");
+    assert_eq!(
+        codes(vec![guess("deg"), steps()]),
+        ["unit-against-gravity", "under-sampled"]
+    );
+    let same = vec![guess("deg"), steps(), cause(GYRO_UNIT.to("deg"))];
+    assert_eq!(codes(same), ["unit-against-gravity", "under-sampled"]);
+    let other = vec![
+        guess("mrad"),
+        guess("deg"),
+        steps(),
+        cause(GYRO_SCALE.to("0.001064")),
+    ];
+    assert_eq!(codes(other), [SCALE]);
+}
