@@ -62,7 +62,7 @@ pub struct Reading {
     pub force: Vector3<f64>,
 }
 
-/// What gyro and accelerometer disagree about.
+/// Cause of a disagreement of gyro and accelerometer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Cause {
     /// Axes of the gyro: true rates by recorded ones.
@@ -79,7 +79,7 @@ pub enum Cause {
         /// One standard deviation of the factor, as a share of it.
         sigma: f64,
     },
-    /// No map explains it: the rates are wrong, or gravity stays with the body.
+    /// Unknown, since no map explains it: the rates are wrong, or gravity stays with the body.
     Unknown,
 }
 
@@ -110,7 +110,7 @@ pub struct Consistency {
     kept: VecDeque<Segment>,
     bank: Option<Evidence>,
     held: usize,
-    said: Option<Verdict>,
+    settled: Option<Verdict>,
 }
 
 impl Default for Consistency {
@@ -125,7 +125,7 @@ impl Default for Consistency {
             kept: VecDeque::new(),
             bank: None,
             held: 0,
-            said: None,
+            settled: None,
         }
     }
 }
@@ -153,7 +153,7 @@ impl Consistency {
     /// Disagreement that is seen; `None` where there is none, or too little motion to tell.
     #[must_use]
     pub fn disagreement(&self) -> Option<Disagreement> {
-        let verdict = self.said?;
+        let verdict = self.settled?;
         let cause = match verdict.answer {
             Answer::Map(decided) => BANK
                 .get(verdict.hypothesis)
@@ -253,7 +253,7 @@ impl Consistency {
         let verdict = self.bank.as_ref().and_then(Evidence::verdict);
         self.held = verdict.map_or(0, |_| self.held + 1);
         if self.held >= HOLD {
-            self.said = verdict;
+            self.settled = verdict;
         }
     }
 }

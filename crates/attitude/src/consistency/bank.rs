@@ -43,7 +43,7 @@ pub(super) struct Hypothesis {
     pub(super) map: Matrix3<f64>,
     /// Factor, where it is one.
     pub(super) factor: Option<f64>,
-    /// How far from what was recorded: of those that explain the same, the nearest is named.
+    /// Distance from what was recorded: of those that explain the same, the nearest is named.
     cost: f64,
 }
 
@@ -139,9 +139,9 @@ impl Residuals {
 pub(super) enum Answer {
     /// The true rates are a signed map of the recorded ones; recorded axes whose place is decided.
     Map([bool; 3]),
-    /// They are about this factor of them.
+    /// The true rates are about this factor of them.
     Factor,
-    /// No map makes gravity stand still, and no rotation at all is as good.
+    /// Lack of any map: no rotation at all makes gravity stand still as well.
     Contradiction,
 }
 
@@ -182,19 +182,19 @@ impl Evidence {
     pub(super) fn push(&mut self, segment: &Segment) {
         let row = self.residuals.push(segment);
         for (h, sum) in self.sums.iter_mut().enumerate() {
-            *sum += said(&row, h);
+            *sum += evidence_of(&row, h);
         }
         self.rows.push_back(row);
         if self.rows.len() > MEMORY
             && let Some(oldest) = self.rows.pop_front()
         {
             for (h, sum) in self.sums.iter_mut().enumerate() {
-                *sum -= said(&oldest, h);
+                *sum -= evidence_of(&oldest, h);
             }
         }
     }
 
-    /// What may be said by now; `None` where nothing may.
+    /// Verdict by now; `None` where nothing may be said.
     pub(super) fn verdict(&self) -> Option<Verdict> {
         let best = self.sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if self.rows.len() < LEAST_SEGMENTS || best < LEAST_EVIDENCE || !best.is_finite() {
@@ -205,12 +205,15 @@ impl Evidence {
         let telling: Vec<&Vec<f64>> = self
             .rows
             .iter()
-            .filter(|row| said(row, chosen).abs() > TELLING)
+            .filter(|row| evidence_of(row, chosen).abs() > TELLING)
             .collect();
         if telling.len() < LEAST_SEGMENTS {
             return None;
         }
-        let agree = telling.iter().filter(|row| said(row, chosen) > 0.0).count();
+        let agree = telling
+            .iter()
+            .filter(|row| evidence_of(row, chosen) > 0.0)
+            .count();
         let (identity, found) = (median(&telling, 0), median(&telling, chosen));
         let share = agree as f64 / telling.len() as f64;
         let (evidence, nothing) = (self.sums[chosen], self.sums[MAPS]);
@@ -274,8 +277,8 @@ impl Evidence {
     }
 }
 
-/// What a segment says for a hypothesis against the identity.
-fn said(row: &[f64], h: usize) -> f64 {
+/// Evidence of a segment for a hypothesis against the identity.
+fn evidence_of(row: &[f64], h: usize) -> f64 {
     let of = |h: usize| row.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
     (of(0) / of(h)).ln().clamp(-CLIP, CLIP)
 }

@@ -58,7 +58,7 @@ impl GyroWatch {
         self.force = Some((stamp, force));
     }
 
-    /// What was seen.
+    /// Gyro against accelerometer as far as was seen.
     pub(super) fn consistency(&self) -> &Consistency {
         &self.consistency
     }

@@ -39,7 +39,7 @@ const COUNTS: [(f64, u32); 8] = [
     (1000.0 / 8.75, 250),
 ];
 
-/// What a factor of the rates is known as.
+/// A factor of the rates by its name.
 struct Named {
     /// True rates by those as they were taken.
     factor: f64,

@@ -115,9 +115,9 @@ fn the_scale_of_the_gyro_is_named_and_what_is_advised_cures_it() {
             GYRO_SCALE.to("0.001064"),
         ),
         (
-            131.0 * deg,
-            "counts of a range of 250 deg/s",
-            GYRO_SCALE.to("0.0001332"),
+            65.5 * deg,
+            "counts of a range of 500 deg/s",
+            GYRO_SCALE.to("0.0002665"),
         ),
     ] {
         let bad = by_gyro(&clean, &Matrix3::from_diagonal_element(factor));
