@@ -10,6 +10,11 @@ use nalgebra::Vector3;
 const FEWEST: usize = 5;
 /// Largest deviation at rest: of the rate (rad/s), of the force (m/s^2), and of the mean rate from the median one.
 pub(super) const STILL_RATE: f64 = 0.5_f64.to_radians();
+/// The same of a rate of which no more than that is slower than a block: white noise, and lines above some Hz, turn a
+/// body by nothing. Moving bodies had 0.04 and more, resting ones 0.02 at most (`condition::stillness`).
+const NOISY_RATE: f64 = 0.025;
+/// Length of such a block, s.
+const BLOCK_SECS: f64 = 0.125;
 const STILL_FORCE: f64 = 0.2;
 pub(super) const STILL_MEAN: f64 = 0.5_f64.to_radians();
 /// A log without noise has thresholds of nothing.
@@ -32,54 +37,111 @@ pub(super) struct Segment {
     pub mean_force: Vector3<f64>,
     /// Largest standard deviation of an axis: rate, force.
     pub spread: [f64; 2],
+    /// That of the rate without what is faster than a block, rad/s.
+    pub slow: f64,
 }
 
-/// Mean and sum of squares about it, of rate and force.
+/// Mean and sum of squares about it.
+#[derive(Clone, Copy)]
+struct Moments {
+    count: usize,
+    mean: Vector3<f64>,
+    square: Vector3<f64>,
+}
+
+impl Moments {
+    fn none() -> Moments {
+        Moments {
+            count: 0,
+            mean: Vector3::zeros(),
+            square: Vector3::zeros(),
+        }
+    }
+
+    fn take(&mut self, value: &Vector3<f64>) {
+        self.count += 1;
+        let off = value - self.mean;
+        self.mean += off * (1.0 / self.count as f64);
+        self.square += off.component_mul(&(value - self.mean));
+    }
+
+    /// Moments of both together (Chan, Golub, LeVeque 1979).
+    fn with(mut self, later: &Moments) -> Moments {
+        if later.count == 0 {
+            return self;
+        }
+        let (n, m) = (self.count as f64, later.count as f64);
+        let off = later.mean - self.mean;
+        self.square += later.square + off.component_mul(&off) * (n * m / (n + m));
+        self.mean += off * (m / (n + m));
+        self.count += later.count;
+        self
+    }
+
+    /// Largest standard deviation of an axis.
+    fn spread(&self) -> f64 {
+        let count = self.count.max(1) as f64;
+        (self.square.max() / count).max(0.0).sqrt()
+    }
+}
+
+/// Sums over the samples of a segment.
 #[derive(Clone, Copy)]
 struct Sums {
-    samples: usize,
     secs: f64,
     stamp: i64,
     doubt: [f64; 2],
-    mean: [Vector3<f64>; 2],
-    square: [Vector3<f64>; 2],
+    rate: Moments,
+    force: Moments,
+    /// The current block of rates, its number, and the means of those before it.
+    block: Moments,
+    number: f64,
+    blocks: Moments,
 }
 
 impl Sums {
     fn none() -> Sums {
         Sums {
-            samples: 0,
             secs: 0.0,
             stamp: 0,
             doubt: [0.0; 2],
-            mean: [Vector3::zeros(); 2],
-            square: [Vector3::zeros(); 2],
+            rate: Moments::none(),
+            force: Moments::none(),
+            block: Moments::none(),
+            number: 0.0,
+            blocks: Moments::none(),
         }
     }
 
-    fn take(&mut self, sample: &Prepared) {
-        self.samples += 1;
-        let share = 1.0 / self.samples as f64;
-        for (what, value) in [&sample.rate, &sample.force].into_iter().enumerate() {
-            let off = value - self.mean[what];
-            self.mean[what] += off * share;
-            self.square[what] += off.component_mul(&(value - self.mean[what]));
+    /// Takes a sample of the block of this number.
+    fn take(&mut self, sample: &Prepared, number: f64) {
+        self.rate.take(&sample.rate);
+        self.force.take(&sample.force);
+        if number != self.number {
+            self.end_block();
+            self.number = number;
         }
+        self.block.take(&sample.rate);
         self.secs += sample.secs;
         self.stamp = sample.stamp;
         self.doubt[0] += sample.doubt[0];
         self.doubt[1] += sample.doubt[1];
     }
 
-    /// Sums of both together (Chan, Golub, LeVeque 1979).
-    fn with(mut self, later: &Sums) -> Sums {
-        let (n, m) = (self.samples as f64, later.samples as f64);
-        for what in 0..2 {
-            let off = later.mean[what] - self.mean[what];
-            self.square[what] += later.square[what] + off.component_mul(&off) * (n * m / (n + m));
-            self.mean[what] += off * (m / (n + m));
+    fn end_block(&mut self) {
+        if self.block.count > 0 {
+            self.blocks.take(&self.block.mean);
         }
-        self.samples += later.samples;
+        self.block = Moments::none();
+    }
+
+    /// Sums of both together.
+    fn with(mut self, later: &Sums) -> Sums {
+        self.rate = self.rate.with(&later.rate);
+        self.force = self.force.with(&later.force);
+        self.end_block();
+        self.blocks = self.blocks.with(&later.blocks);
+        self.block = later.block;
         self.secs += later.secs;
         self.stamp = later.stamp;
         self.doubt[0] += later.doubt[0];
@@ -87,21 +149,31 @@ impl Sums {
         self
     }
 
-    fn segment(&self) -> Segment {
-        let spread = self
-            .square
-            .map(|square| (square.max() / self.samples as f64).max(0.0).sqrt());
+    fn segment(mut self) -> Segment {
+        self.end_block();
         Segment {
-            samples: self.samples,
+            samples: self.rate.count,
             secs: self.secs,
             stamp: self.stamp,
             is_break: false,
             is_still: false,
             doubt: self.doubt,
-            mean_rate: self.mean[0],
-            mean_force: self.mean[1],
-            spread,
+            mean_rate: self.rate.mean,
+            mean_force: self.force.mean,
+            spread: [self.rate.spread(), self.force.spread()],
+            slow: self.slow(),
         }
+    }
+
+    /// Scatter of the means over blocks less what white noise leaves of it; of all samples where a block holds but one.
+    fn slow(&self) -> f64 {
+        let (spread, held) = (self.rate.spread(), self.rate.count as f64);
+        let held = held / self.blocks.count.max(1) as f64;
+        if held < 2.0 {
+            return spread;
+        }
+        let left = self.blocks.spread().powi(2) - spread * spread / held;
+        left.max(0.0).sqrt()
     }
 }
 
@@ -136,16 +208,18 @@ impl Cutter {
         };
         let secs = sample.stamp.saturating_sub(origin) as f64 * 1e-9;
         let slot = (secs / self.spacing + 1e-9).floor();
+        // A segment holds its last node's sample: so does a block.
+        let block = (secs / BLOCK_SECS - 1e-9).ceil();
         if sample.is_after_break {
             self.end_section();
             let mut gap = Sums::none();
-            gap.take(sample);
+            gap.take(sample, block);
             self.segments.push(Segment {
                 is_break: true,
                 ..gap.segment()
             });
         } else {
-            self.current.take(sample);
+            self.current.take(sample, block);
             if slot > self.slot {
                 self.segments
                     .extend(self.complete.take().map(|sums| sums.segment()));
@@ -158,12 +232,12 @@ impl Cutter {
     fn end_section(&mut self) {
         let current = std::mem::replace(&mut self.current, Sums::none());
         match self.complete.take() {
-            Some(complete) if current.samples > 0 && current.samples < FEWEST => {
+            Some(complete) if current.rate.count > 0 && current.rate.count < FEWEST => {
                 self.segments.push(complete.with(&current).segment());
             }
             complete => {
                 self.segments.extend(complete.map(|sums| sums.segment()));
-                if current.samples > 0 {
+                if current.rate.count > 0 {
                     self.segments.push(current.segment());
                 }
             }
@@ -186,11 +260,15 @@ pub(super) fn find_standstill(segments: &mut [Segment]) -> Option<Vector3<f64>> 
             .map(|segment| segment.spread[what])
             .collect()
     };
-    let rate = (2.0 * fifth_percentile(moving(0))?).min(STILL_RATE) + SLACK;
+    let rate = (2.0 * fifth_percentile(moving(0))?).min(NOISY_RATE) + SLACK;
     let force = (1.6 * fifth_percentile(moving(1))?).min(STILL_FORCE) + SLACK;
     let mut quiet: Vec<bool> = segments
         .iter()
-        .map(|segment| !segment.is_break && segment.spread[0] < rate && segment.spread[1] < force)
+        .map(|segment| {
+            let slow = segment.spread[0].min(segment.slow);
+            let is_steady = segment.spread[0] < rate && slow < STILL_RATE + SLACK;
+            !segment.is_break && is_steady && segment.spread[1] < force
+        })
         .collect();
     let bias = rests::rate_of(segments, &quiet)?;
     for (quiet, segment) in quiet.iter_mut().zip(segments.iter()) {

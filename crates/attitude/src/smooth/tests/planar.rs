@@ -251,6 +251,52 @@ fn a_turntable_at_a_constant_rate_never_rests() {
 }
 
 #[test]
+fn a_rest_is_seen_under_the_noise_and_the_lines_of_a_gyro() {
+    // White noise of 0.6 deg/s a sample, and a line of 1.1 deg/s at 6 Hz: what the gyro reads as it moves, too.
+    for line in [0.0, 1.6_f64.to_radians()] {
+        let body = Body {
+            secs: 60.0,
+            shaking: 0.5,
+            bias: [0.2, -0.1, 0.3],
+            ..Body::new(
+                |t| 0.5 * wanders(t) * (1.0 - ramp(t, 40.0, 42.0)),
+                |t| 0.5 * (1.0 - ramp(t, 40.0, 42.0)),
+            )
+        };
+        let mut log = body.log();
+        let mut noise = Noise(5);
+        let white = if line > 0.0 { 0.1 } else { 0.6_f64 };
+        for (i, sample) in log.samples.iter_mut().enumerate() {
+            let t = i as f64 / HZ;
+            sample.rate.0 += noise.vector(white.to_radians())
+                + Vector3::x() * (line * (std::f64::consts::TAU * 6.05 * t).sin());
+        }
+        let (smoothed, estimates) = log.smoothed(&Settings::default());
+        let counts = smoothed.counts();
+        assert!((30..=37).contains(&counts.standstills), "{counts:?}");
+        let held = smoothed.held().unwrap();
+        assert!(held.is_by_rest, "{held:?}");
+        assert!((held.rate.to_degrees() - 0.3).abs() < 0.1, "{held:?}");
+        assert!(inside(&estimates, &log.truth) > 0.97);
+    }
+}
+
+#[test]
+fn a_slow_wave_under_the_noise_is_no_rest() {
+    // As quiet as the noise, and a motion of the body: 1 deg/s to and fro at 1 Hz.
+    let body = Body {
+        secs: 60.0,
+        bias: [0.2, -0.1, 0.3],
+        ..Body::new(
+            |t| 1.4_f64.to_radians() * (std::f64::consts::TAU * t).sin(),
+            |_| 0.0,
+        )
+    };
+    let seen = body.smoothed();
+    assert_eq!(seen.smoothed.counts().standstills, 0, "{seen:?}");
+}
+
+#[test]
 fn a_rest_at_the_end_alone_tells_the_bias_of_a_log_that_starts_in_a_curve() {
     let body = Body {
         shaking: 0.3,

@@ -56,6 +56,7 @@ fn place() -> Place {
         mean_rate: Vector3::zeros(),
         mean_force: Vector3::zeros(),
         spread: [0.0; 2],
+        slow: 0.0,
     };
     let mut place = Place {
         samples: prepared[3001..=3050].to_vec(),
