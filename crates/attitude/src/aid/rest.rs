@@ -1,7 +1,7 @@
 //! Rate and force -> whether the sensor is at rest, and what its gyro reads there. Pure.
 
 use super::settings::Settings;
-use crate::condition::stillness::Swing;
+use crate::condition::stillness::{Swing, is_solely_vertical};
 use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -33,6 +33,25 @@ pub(super) struct Rest {
     last_force: Option<Vector3<f64>>,
     #[cfg_attr(feature = "serde", serde(default))]
     swing: Swing,
+    /// The mean rate of the first interval, rad/s, and whether one has been another by more than a rest allows: until
+    /// then a rate about the vertical is that of all that was seen.
+    #[cfg_attr(feature = "serde", serde(default))]
+    first: Option<Vector3<f64>>,
+    #[cfg_attr(feature = "serde", serde(default))]
+    has_moved: bool,
+}
+
+/// What an interval read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    /// Mean rate, rad/s, body axes.
+    pub(super) mean: Vector3<f64>,
+    /// What of it is not known to be bias.
+    pub(super) off: Vector3<f64>,
+    /// The vertical in the body, any length.
+    pub(super) up: Vector3<f64>,
+    /// s.
+    pub(super) secs: f64,
 }
 
 /// The gyro's reading of a rest.
@@ -94,16 +113,22 @@ impl Rest {
         self.swing = Swing::default();
     }
 
-    /// Takes the mean rate over an interval, and what of it is not known to be bias. Returns what the gyro reads at rest,
-    /// once the body has rested on for long enough since: the mean of the whole spell the first time, then of one interval
+    /// Takes an interval. Returns what the gyro reads at rest, once the body has rested on for long enough since: the mean of the whole spell the first time, then of one interval
     /// each.
     pub(super) fn take_interval(
         &mut self,
-        (mean, off): (Vector3<f64>, Vector3<f64>),
-        secs: f64,
+        interval: &Interval,
         is_at_rest: bool,
         settings: &Settings,
     ) -> Option<RestRate> {
+        let Interval {
+            mean,
+            off,
+            up,
+            secs,
+        } = *interval;
+        let first = self.first.get_or_insert(mean);
+        self.has_moved |= (mean - *first).norm() > settings.rest_gyro;
         if self.quiet < secs {
             self.forget();
             return None;
@@ -149,7 +174,9 @@ impl Rest {
             .map(|(mean, _)| (mean - whole).map(|d| d * d))
             .sum::<Vector3<f64>>()
             / (count - 1.0);
-        if self.changes(&scatter) {
+        // What is known of the bias is in `off` alone.
+        let is_sole = !self.has_moved && !self.is_certain;
+        if self.changes(&scatter) || is_sole && is_solely_vertical(&(whole - mean + off), &up) {
             return None;
         }
         let one = scatter.map(|of| of.max(settings.rest_noise.powi(2) / secs));
@@ -196,6 +223,7 @@ impl Rest {
             && are_numbers(&self.force)
             && is_amount(self.quiet)
             && self.last_force.as_ref().is_none_or(are_numbers)
+            && self.first.as_ref().is_none_or(are_numbers)
             && self.swing.is_plausible()
             && self
                 .open

@@ -8,6 +8,7 @@ use super::covariance::{
 use super::filter::{COLOURED, Filter, Innovation};
 use super::gravity::Force;
 use super::interval::Interval;
+use super::rest;
 use super::start::{POSITION_START, VELOCITY_START};
 use crate::condition::stillness::{BEYOND_CLASS, about_vertical};
 use crate::frames::Nav;
@@ -67,7 +68,13 @@ impl Filter {
             rest.interrupt();
             return;
         }
-        let Some(rate) = rest.take_interval((mean, off), secs, is_at_rest, &self.settings) else {
+        let interval = rest::Interval {
+            mean,
+            off,
+            up,
+            secs,
+        };
+        let Some(rate) = rest.take_interval(&interval, is_at_rest, &self.settings) else {
             return;
         };
         for axis in 0..3 {

@@ -15,7 +15,9 @@ mod turns;
 pub(crate) use estimate::rest_at_start;
 pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level};
 pub(crate) use swing::Swing;
-pub(crate) use turns::{ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical};
+pub(crate) use turns::{
+    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical, is_solely_vertical,
+};
 
 use crate::frames::{Body, In};
 use crate::quaternion::BodyRate;
@@ -98,6 +100,7 @@ impl Rest {
             secs: self.secs(),
             first: Some(self.start),
             stillest: None,
+            has_moved: false,
         }
     }
 
@@ -121,6 +124,8 @@ pub struct Rests {
     pub first: Option<Nanos>,
     /// Smallest gyro deviation of any window (largest axis), rad/s: how still it ever was.
     pub stillest: Option<f64>,
+    /// Whether there was a window in which the body did not rest.
+    pub has_moved: bool,
 }
 
 /// Streaming mean and variance of three axes (Welford 1962).
@@ -252,9 +257,12 @@ impl Stillness {
             || rate.amax() > self.limits.max_mean_rate
             || shakes
         {
+            self.rests.has_moved = true;
             return self.close();
         }
-        if self.growing.is_some_and(|g| self.parts(&g, window, accel)) {
+        if let Some(growing) = self.growing
+            && self.parts(&growing, window, accel)
+        {
             self.close();
         }
         let growing = self.growing.get_or_insert(Growing {
@@ -284,7 +292,7 @@ impl Stillness {
     }
 
     /// Whether the window is still, but not in the pose or at the rate of the rest before it.
-    fn parts(&self, growing: &Growing, window: &Window, accel: Option<Vector3<f64>>) -> bool {
+    fn parts(&mut self, growing: &Growing, window: &Window, accel: Option<Vector3<f64>>) -> bool {
         let noise = (window.gyro.variance() / f64::from(window.gyro.n))
             .max()
             .sqrt();
@@ -294,6 +302,7 @@ impl Stillness {
             (Some(a), Some(b)) => a.angle(&b) > self.limits.max_tilt,
             _ => false,
         };
+        self.rests.has_moved |= turned;
         turned || (window.gyro.mean - growing.last_rate).amax() > allowed
     }
 

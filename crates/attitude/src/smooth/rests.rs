@@ -6,13 +6,15 @@
 
 use super::segments::{STILL_MEAN, Segment, median_of, median_rate};
 use crate::condition::stillness::{
-    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical,
+    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical, is_solely_vertical,
 };
 use nalgebra::Vector3;
 use std::ops::Range;
 
 /// Runs up to this long must not drift, s.
 const LONGEST_JUDGED: f64 = 20.0;
+/// A body has moved whose rate was another by this, rad/s (2 deg/s).
+const MOVES: f64 = 0.0349;
 
 /// Segments one after the other that scatter like a body at rest.
 pub(super) struct Run {
@@ -72,6 +74,12 @@ impl Run {
     /// Whether it points along gravity, as the rate of a turn does that leaves gravity where it is.
     fn is_along(&self) -> bool {
         about_vertical(&self.rate, &self.up).is_some()
+    }
+
+    /// Whether it is a turn about the vertical by its direction alone, since the body has done nothing else.
+    fn is_turn_of_all(&self, segments: &[Segment]) -> bool {
+        let moves = |s: &Segment| !s.is_break && (s.mean_rate - self.rate).norm() > MOVES;
+        is_solely_vertical(&self.rate, &self.up) && !segments.iter().any(moves)
     }
 
     /// Whether two can be the rate of one bias.
@@ -146,7 +154,8 @@ pub(super) fn rate_of(segments: &[Segment], quiet: &[bool]) -> Option<Vector3<f6
 pub(super) fn keep_rests(segments: &mut [Segment], bias_sigma: f64) -> Option<Vector3<f64>> {
     let (mut kept, mut dropped): (Vec<Run>, Vec<Run>) =
         rests(segments).into_iter().partition(|run| {
-            let is_turning = run.is_along() && run.along() > BEYOND_CLASS * bias_sigma;
+            let is_beyond = run.is_along() && run.along() > BEYOND_CLASS * bias_sigma;
+            let is_turning = is_beyond || run.is_turn_of_all(segments);
             !run.drifts(segments) && !is_turning
         });
     let secs: f64 = kept.iter().map(|run| run.secs).sum();

@@ -298,6 +298,82 @@ fn a_turntable_is_no_rest() {
 }
 
 #[test]
+fn a_turntable_as_slow_as_a_bias_is_no_rest_by_its_direction() {
+    // 1 deg/s is what a gyro of the class has, but not along the vertical alone.
+    let up = Vector3::z() * DEG;
+    let motion = |_| (up, still());
+    let body = Body {
+        bias: [0.05, -0.03, 0.04],
+        ..Body::new(120.0, &motion)
+    };
+    let table = seen(&default(), &body);
+    assert!(table.warns_of_a_turn() && !table.is_by_default());
+    assert!(
+        table.most < 10.0 && table.within > 0.99 && table.sigma > 0.9,
+        "{} {} {}",
+        table.most,
+        table.within,
+        table.sigma
+    );
+    // The filter by itself, of a stream or with the bias left in, learns nothing of it either.
+    let none = Plan {
+        bias: Bias::None,
+        ..default()
+    };
+    let table = seen(&none, &body);
+    assert!(
+        table.most < 10.0 && table.within > 0.99 && table.sigma > 0.9,
+        "{} {} {}",
+        table.most,
+        table.within,
+        table.sigma
+    );
+}
+
+#[test]
+fn a_turntable_that_starts_from_rest_has_the_bias_of_its_rest() {
+    let start = |t: f64| (Vector3::z() * ((t - 20.0).clamp(0.0, 1.0) * DEG), still());
+    let table = seen(&default(), &Body::new(120.0, &start));
+    assert!(table.is_by_default() && table.warns_of_a_turn());
+    assert!(
+        table.most < 1.0 && table.within > 0.99 && table.bias.abs() < 0.02,
+        "{} {} {}",
+        table.most,
+        table.within,
+        table.bias
+    );
+}
+
+#[test]
+fn a_bias_along_the_vertical_of_a_body_that_moves_later_is_a_bias() {
+    let moved = hand(10.0, 20.0);
+    let body = Body {
+        bias: [0.02, 0.03, 1.0],
+        ..Body::new(26.0, &moved)
+    };
+    let rest = seen(&default(), &body);
+    assert!(
+        rest.is_by_default() && !rest.warns_of_a_turn() && rest.most < 1.0,
+        "{} {:?}",
+        rest.most,
+        rest.prepared.warnings
+    );
+    // A filter that has not read ahead learns it when the body has come back to rest.
+    let none = Plan {
+        bias: Bias::None,
+        ..default()
+    };
+    let filter = seen(&none, &body);
+    assert!(
+        filter.bias.abs() < 0.05 && filter.sigma < 0.1 && filter.within > 0.99,
+        "{} {} {}",
+        filter.bias,
+        filter.sigma,
+        filter.within
+    );
+}
+
+#[test]
 fn a_steady_turn_about_another_axis_takes_gravity_along() {
     for rate in [0.5, 2.0] {
         let axis = Vector3::new(0.5, 0.0, 0.75_f64.sqrt()) * (rate * DEG);

@@ -7,6 +7,7 @@
 use super::{Rest, Rests};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
+use crate::frames::In;
 use crate::setting::BIAS;
 use nalgebra::Vector3;
 
@@ -22,6 +23,20 @@ pub(crate) const FEW_SECS: f64 = 10.0;
 pub(crate) const SHORT_SECS: f64 = 1.4;
 /// Rates of one bias differ by no more than this and three of their sigmas, rad/s.
 pub(crate) const SAME: f64 = 0.002;
+
+/// A rate along the vertical that is above so many times what it is across, and above three times [`ACROSS`], is that
+/// of a turn if the body has done nothing else: of gyros whose bias points anywhere one in 200 has it so.
+const SOLELY_ALONG: f64 = 10.0;
+
+/// Whether a body of which nothing has been seen but the rate `rate` (rad/s) turns about the vertical `up` (any
+/// length), by its direction alone: a bias of the class may be as large.
+pub(crate) fn is_solely_vertical(rate: &Vector3<f64>, up: &Vector3<f64>) -> bool {
+    let Some(along) = about_vertical(rate, up) else {
+        return false;
+    };
+    let square = rate.norm_squared() - along * along;
+    along * along > SOLELY_ALONG * SOLELY_ALONG * square
+}
 
 /// Rate along the vertical `up` (any length), rad/s, of one that has hardly any across: that of a turn which leaves
 /// gravity where it is.
@@ -41,10 +56,56 @@ impl Rest {
         }
     }
 
+    fn is_solely_vertical(&self) -> bool {
+        let up = self.mean_accel.as_ref().map(In::as_vector);
+        up.is_some_and(|up| is_solely_vertical(&self.mean_rate.0, up))
+    }
+
+    fn up(&self) -> Option<Vector3<f64>> {
+        self.mean_accel.as_ref()?.as_vector().try_normalize(0.0)
+    }
+
+    fn along(&self, rate: &Vector3<f64>) -> Option<f64> {
+        Some(rate.dot(&self.up()?))
+    }
+
+    /// Rate beside that of another rest, rad/s, if that is a turn about the vertical: one bias is the same in both.
+    fn turns_beside(&self, other: &Rest) -> Option<f64> {
+        let off = self.mean_rate.0 - other.mean_rate.0;
+        let turn = about_vertical(&off, self.mean_accel.as_ref()?.as_vector());
+        turn.filter(|_| !self.reads_as(other))
+    }
+
+    /// Whether both read the same across the vertical, and not along it.
+    fn differs_along_alone(&self, other: &Rest) -> bool {
+        let off = self.mean_rate.0 - other.mean_rate.0;
+        let Some(up) = self.up() else {
+            return false;
+        };
+        let along = off.dot(&up);
+        let across = (off - up * along).norm();
+        let sigma = self.sigma.norm().hypot(other.sigma.norm());
+        let same = SAME + 3.0 * sigma;
+        along.abs() > same && across < same
+    }
+
     fn reads_as(&self, other: &Rest) -> bool {
         let off = self.mean_rate.0 - other.mean_rate.0;
         (0..3).all(|i| off[i].abs() <= SAME + 3.0 * self.sigma[i].hypot(other.sigma[i]))
     }
+}
+
+fn longest_of(rests: &[Rest]) -> Option<&Rest> {
+    rests.iter().max_by(|a, b| a.secs().total_cmp(&b.secs()))
+}
+
+/// The rest whose rate along its vertical is the least.
+fn slowest_of(rests: &[Rest]) -> Option<Rest> {
+    let along = |rest: &Rest| rest.along(&rest.mean_rate.0).unwrap_or_default().abs();
+    rests
+        .iter()
+        .min_by(|a, b| along(a).total_cmp(&along(b)))
+        .copied()
 }
 
 impl Rests {
@@ -60,31 +121,49 @@ impl Rests {
     pub fn less_turns(&self, class: f64) -> (Rests, Option<Diagnostic>) {
         let is_few = self.secs < FEW_SECS;
         let is_short = |rest: &Rest| is_few && rest.secs() < SHORT_SECS;
+        let is_sole = |rest: &Rest| !self.has_moved && rest.is_solely_vertical();
         let is_turn = |rest: &Rest| {
             let turn = rest.turn().map(f64::abs);
-            turn.is_some_and(|turn| turn > BEYOND_CLASS * class || is_short(rest))
+            turn.is_some_and(|turn| turn > BEYOND_CLASS * class || is_short(rest) || is_sole(rest))
         };
-        let (turns, kept): (Vec<Rest>, Vec<Rest>) = self.kept.iter().partition(|r| is_turn(r));
-        let Some(longest) = turns.iter().max_by(|a, b| a.secs().total_cmp(&b.secs())) else {
-            return (self.clone(), None);
-        };
+        let (mut turns, mut kept): (Vec<Rest>, Vec<Rest>) =
+            self.kept.iter().partition(|r| is_turn(r));
         // A turn does not come back at the very rate it had before the body moved.
-        let is_bias = |rest: &Rest| !is_short(rest) && rest.reads_as(longest);
-        if kept.is_empty() && turns.len() > 1 && turns.iter().all(is_bias) {
-            return (self.clone(), None);
+        if let Some(longest) = longest_of(&turns) {
+            let is_bias = |rest: &Rest| !is_short(rest) && rest.reads_as(longest);
+            let come_back = self.has_moved && turns.len() > 1 && turns.iter().all(is_bias);
+            if kept.is_empty() && come_back {
+                return (self.clone(), None);
+            }
         }
+        if let Some(slowest) = slowest_of(&kept) {
+            // Short rests that differ along the vertical alone: neither is one.
+            if is_few && kept.iter().any(|rest| rest.differs_along_alone(&slowest)) {
+                turns.append(&mut kept);
+            }
+            turns.extend(kept.extract_if(.., |rest| rest.turns_beside(&slowest).is_some()));
+        }
+        let Some(longest) = longest_of(&turns) else {
+            return (self.clone(), None);
+        };
+        let beside = || longest.turns_beside(&slowest_of(&kept)?);
+        let (rate, than) = match longest.turn() {
+            Some(turn) => (turn, ""),
+            None => (beside().unwrap_or_default(), " more than in another rest"),
+        };
         let said = Diagnostic::new(format!(
-            "for {:.1} s the gyro reads {} deg/s about the vertical, hardly anything across, and all else rests: taken for a steady turn, not for its bias",
+            "for {:.1} s the gyro reads {} deg/s{than} about the vertical, hardly anything across, and all else rests: taken for a steady turn, not for its bias",
             longest.secs(),
-            significant(longest.turn().unwrap_or_default().to_degrees(), 3),
+            significant(rate.to_degrees(), 3),
         ))
         .help(format!("{BIAS} auto takes it for the bias, {BIAS} x,y,z (rad/s) says one"));
+        let is_said = !is_short(longest);
         let rests = Rests {
             count: kept.len() as u64,
             secs: kept.iter().map(Rest::secs).sum(),
             kept,
             ..self.clone()
         };
-        (rests, (!is_short(longest)).then_some(said))
+        (rests, is_said.then_some(said))
     }
 }

@@ -251,6 +251,24 @@ fn a_turntable_at_a_constant_rate_never_rests() {
 }
 
 #[test]
+fn a_turntable_as_slow_as_a_bias_never_rests() {
+    for rate in [1.0, 2.0] {
+        let turn: fn(f64) -> f64 = if rate < 2.0 {
+            |_| 1_f64.to_radians()
+        } else {
+            |_| 2_f64.to_radians()
+        };
+        let body = Body {
+            bias: [0.05, -0.03, 0.04],
+            ..Body::new(turn, |_| 0.0)
+        };
+        let seen = body.smoothed();
+        assert_eq!(seen.smoothed.counts().standstills, 0, "{rate}");
+        assert!(seen.inside > 0.97 && seen.errors[3] < 15.0, "{seen:?}");
+    }
+}
+
+#[test]
 fn a_rest_is_seen_under_the_noise_and_the_lines_of_a_gyro() {
     // White noise of 0.6 deg/s a sample, and a line of 1.1 deg/s at 6 Hz: what the gyro reads as it moves, too.
     for line in [0.0, 1.6_f64.to_radians()] {
