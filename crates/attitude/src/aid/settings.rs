@@ -18,6 +18,9 @@ pub struct Settings {
     /// Prior sigma of the gyro's bias, rad/s. Of a sensor just switched on; smaller is better for a vehicle that
     /// is never at rest.
     pub bias_prior: f64,
+    /// Largest sigma of the bias by which a steady turn about the vertical is told from it, rad/s: that of the sensor's
+    /// class where the prior is wider.
+    pub bias_class: f64,
     /// Prior sigma of the gyro's scale factors.
     pub scale_prior: f64,
     /// Prior sigma of the angles between its axes, rad.
@@ -130,6 +133,7 @@ impl Default for Settings {
             bias_by_tilt: 2e-4,
             rate_noise: 7e-5,
             bias_prior: 0.02,
+            bias_class: f64::INFINITY,
             scale_prior: 4e-3,
             cross_prior: 2e-3,
             force_bias_prior: 0.02,

@@ -60,7 +60,9 @@ impl Filter {
         let is_turn = about_vertical(&off, &up).is_some_and(|turn| {
             let up = up.normalize();
             let now = self.variance_of_bias(&up);
-            turn * turn > BEYOND_CLASS * BEYOND_CLASS * now.max(self.prior_of_bias(&up))
+            let of_class = self.settings.bias_class.powi(2);
+            let variance = now.max(self.prior_of_bias(&up)).min(of_class);
+            turn * turn > BEYOND_CLASS * BEYOND_CLASS * variance
         });
         let is_at_rest = self.rests();
         let rest = &mut self.state.rest;

@@ -42,6 +42,7 @@ pub(super) fn run<S: Samples>(
     let class = usual.bias_prior * share;
     let settings = aid::Settings {
         bias_prior: class,
+        bias_class: class,
         gyro_range: with.1.gyro_range * NEAR_RANGE,
         ..usual
     };

@@ -228,6 +228,27 @@ fn a_steady_turn_at_the_start_and_at_the_end_is_no_rest() {
 }
 
 #[test]
+fn a_steady_turn_of_two_seconds_at_both_ends_is_no_rest() {
+    let turn = |t: f64| {
+        let [before, after] = [1.0 - ramp(t, 2.0, 3.0), ramp(t, 58.0, 59.0)];
+        let between = ramp(t, 2.0, 3.5) * (1.0 - ramp(t, 56.5, 58.0));
+        (2.5 * before + 2.2 * after).to_radians() + 0.5 * wanders(t) * between
+    };
+    let body = Body {
+        secs: 61.0,
+        shaking: 0.3,
+        bias: [0.05, -0.03, 0.04],
+        ..Body::new(turn, |t| {
+            0.4 * ramp(t, 2.3, 3.3) * (1.0 - ramp(t, 57.7, 58.7))
+        })
+    };
+    let seen = body.smoothed();
+    let [_, _, _, most] = seen.errors;
+    assert!(most <= 5.0 && seen.inside > 0.97, "{seen:?}");
+    assert!(seen.smoothed.held().is_some_and(|held| !held.is_by_rest));
+}
+
+#[test]
 fn a_turntable_at_a_constant_rate_never_rests() {
     let body = Body {
         bias: [0.3, -0.2, 0.1],
