@@ -41,16 +41,16 @@ pub(super) struct Rest {
     has_moved: bool,
 }
 
-/// What an interval read.
+/// Readings of an interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interval {
     /// Mean rate, rad/s, body axes.
     pub(super) mean: Vector3<f64>,
-    /// What of it is not known to be bias.
+    /// Mean rate less the known bias, rad/s.
     pub(super) off: Vector3<f64>,
     /// The vertical in the body, any length.
     pub(super) up: Vector3<f64>,
-    /// s.
+    /// Length, s.
     pub(super) secs: f64,
 }
 

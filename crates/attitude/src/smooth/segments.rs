@@ -10,10 +10,10 @@ use nalgebra::Vector3;
 const FEWEST: usize = 5;
 /// Largest deviation at rest: of the rate (rad/s), of the force (m/s^2), and of the mean rate from the median one.
 pub(super) const STILL_RATE: f64 = 0.5_f64.to_radians();
-/// The same of a rate of which no more than that is slower than a block: white noise, and lines above some Hz, turn a
-/// body by nothing. Moving bodies had 0.04 and more, resting ones 0.02 at most (`condition::stillness`).
+/// Largest deviation at rest of a rate of which no more than [`STILL_RATE`] is slower than a block, rad/s: white noise,
+/// and lines above some Hz, turn a body by nothing. Moving bodies had 0.04 and more, resting ones 0.02 at most (`condition::stillness`).
 const NOISY_RATE: f64 = 0.025;
-/// Length of such a block, s.
+/// Length of a block, s.
 const BLOCK_SECS: f64 = 0.125;
 const STILL_FORCE: f64 = 0.2;
 pub(super) const STILL_MEAN: f64 = 0.5_f64.to_radians();
@@ -37,7 +37,7 @@ pub(super) struct Segment {
     pub mean_force: Vector3<f64>,
     /// Largest standard deviation of an axis: rate, force.
     pub spread: [f64; 2],
-    /// That of the rate without what is faster than a block, rad/s.
+    /// Standard deviation of the rate without what is faster than a block, rad/s.
     pub slow: f64,
 }
 
