@@ -232,7 +232,8 @@ pub(super) fn settle(found: &mut Vec<Finding>) {
         .get("factor")
         .and_then(serde_json::Value::as_f64);
     let is_unit = factor.is_some_and(|factor| !(UNIT..1.0 / UNIT).contains(&factor));
-    found.retain(|f| !GUESSES.contains(&f.code) && !(is_unit && BY_UNIT.contains(&f.code)));
+    let is_explained = |code| GUESSES.contains(&code) || (is_unit && BY_UNIT.contains(&code));
+    found.retain(|f| !is_explained(f.code));
 }
 
 #[cfg(test)]
