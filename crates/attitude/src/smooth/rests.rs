@@ -4,7 +4,7 @@
 //! tells them apart is seen in runs of such segments: a bias does not drift within seconds, is the same in every rest,
 //! and points anywhere; a turn that leaves gravity where it is points along it.
 
-use super::segments::{STILL_MEAN, Segment, median_of, median_rate};
+use super::segments::{STILL_MEAN, STILL_RATE, Segment, median_of, median_rate};
 use crate::condition::stillness::{
     ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical, is_solely_vertical,
 };
@@ -24,6 +24,8 @@ pub(super) struct Run {
     pub(super) rate: Vector3<f64>,
     sigma: Vector3<f64>,
     up: Vector3<f64>,
+    /// Whether the gyro scatters in it by more than a quiet one does.
+    pub(super) is_noisy: bool,
 }
 
 /// The runs of the chosen segments.
@@ -64,6 +66,7 @@ impl Run {
             up: mean(&|segment| segment.mean_force)
                 .try_normalize(0.0)
                 .unwrap_or_default(),
+            is_noisy: all.iter().any(|segment| segment.spread[0] > STILL_RATE),
         }
     }
 

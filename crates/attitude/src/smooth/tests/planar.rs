@@ -316,6 +316,8 @@ fn a_rest_is_seen_under_the_noise_and_the_lines_of_a_gyro() {
         let held = smoothed.held().unwrap();
         assert!(held.is_by_rest, "{held:?}");
         assert!((held.rate.to_degrees() - 0.3).abs() < 0.1, "{held:?}");
+        // Known at rest to hundredths, and not so in motion.
+        assert!(held.sigma.to_degrees() > 0.14, "{held:?}");
         assert!(inside(&estimates, &log.truth) > 0.97);
     }
 }
