@@ -24,6 +24,7 @@ pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran
         .current_dir(dir)
         // The user's own settings must not decide a test.
         .env_remove("STRAPD_TIME")
+        .env_remove("STRAPD_STAMPS")
         .env_remove("STRAPD_SAMPLE_KIND")
         .env_remove("STRAPD_LOG")
         // Tests of the integration: the gyro alone, unless one asks for more by --aid.

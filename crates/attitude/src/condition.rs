@@ -22,10 +22,13 @@
 //! | three and more on every stamp: a coarse clock | spread over its step, the first ones at the end of theirs | `Restamped` |
 //! | overtaken on its way, by no more than the window | put back | `Reordered` |
 //! | ... by more | dropped | `Late` |
+//! | a counter wraps (16, 24, 32 bits, a day, a week) | stamps go on, counted and shown | `Accepted` |
+//! | clock set ahead or back, by the arrival clock | stamps go on where they were, counted and shown | `Accepted` |
 //! | clock set back, and it stays so | held (or reset), integration goes on behind it | `Accepted` |
 //! | one stamp far ahead, the rest carries on before it | dropped | `StrayStamp` |
 //! | no stamp, or zero amid others | dropped | `NoStamp` |
 //! | a stamp more than 146 years from the epoch | dropped | `FarStamp` |
+//! | stamped when a batch came (recordings) | spread evenly, at the rate of the batches | `Accepted` |
 //! | step above 1.5 times the ordinary | bridged up to `max_gap_secs`, beyond it `on_gap` | `Accepted` |
 //! | ... but the stamps catch up | a late stamp, not a gap | `Accepted` |
 //!
@@ -35,6 +38,7 @@
 //! intervals disagree by less than half an interval, the stamps are taken to jitter.
 
 mod clock;
+mod follow;
 mod gate;
 mod histogram;
 mod memory;
@@ -50,15 +54,18 @@ pub mod stillness;
 pub mod truncation;
 
 pub use crate::record::GyroUnit;
-pub use clock::{Clock, ClockWarning, choose_clock};
+pub use clock::{
+    BatchRate, Batches, Clock, ClockSpeed, ClockWarning, Period, SpeedPass, SpeedVerdict, batches,
+    choose_clock, choose_clock_as,
+};
 pub use histogram::Histogram;
 pub use memory::Memory;
-pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
+pub use report::{ClockSet, FirstBad, GAPS_KEPT, Gap, Gaps, Report, Wraps};
 pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};
-pub use settings::{OnGap, Settings, SettingsError};
+pub use settings::{OnGap, Settings, SettingsError, StampRepair};
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
-use clock::IndexClock;
+use clock::{BatchLine, ClockSteps, IndexClock, Turns};
 use gate::{Gate, MAX_STAMP};
 use order::Order;
 use timing::Timing;
@@ -87,6 +94,12 @@ pub struct Conditioner {
     finishing: bool,
     /// `--start`, `--until` in nanoseconds after the first stamp.
     trim: Option<(i64, i64)>,
+    /// Turns of a counter are followed.
+    is_followed: bool,
+    /// Stamps are held against their arrival.
+    is_compared: bool,
+    /// Line on which samples of batches lie.
+    batch_line: Option<BatchLine>,
     /// A first sample with stamp zero, until the second tells whether that can be.
     zero: Option<(RawSample, u64)>,
     state: State,
@@ -103,6 +116,15 @@ struct State {
     trimmed_from: Option<Nanos>,
     /// Whether the sample before was dropped.
     rejected: bool,
+    /// Turns of the counter that the stamps are read from.
+    #[cfg_attr(feature = "serde", serde(default))]
+    turns: Turns,
+    /// The stamp clock against the arrival clock.
+    #[cfg_attr(feature = "serde", serde(default))]
+    against_arrival: ClockSteps,
+    /// Nanoseconds by which the stamp clock was set so far, and the last time.
+    #[cfg_attr(feature = "serde", serde(default))]
+    set: (i64, i64),
 }
 
 impl Conditioner {
@@ -114,6 +136,11 @@ impl Conditioner {
         settings.validate()?;
         let max_gap_nanos = secs_to_nanos(settings.max_gap_secs);
         let window = settings.reorder_window;
+        let batch_line = settings.batches.as_ref().map(BatchLine::new);
+        let mut timing = Timing::new(settings, max_gap_nanos);
+        if let Some(line) = &batch_line {
+            timing.expect(line.step());
+        }
         Ok(Conditioner {
             clock: settings.clock,
             index_clock: match settings.clock {
@@ -121,8 +148,8 @@ impl Conditioner {
                 _ => None,
             },
             gate: Gate::new(settings),
-            order: Order::new(window, max_gap_nanos),
-            timing: Timing::new(settings, max_gap_nanos),
+            order: Order::new(window, max_gap_nanos, batch_line.is_some()),
+            timing,
             window,
             hold: match (window, settings.kind) {
                 (0, SampleKind::Rate) => 0,
@@ -130,7 +157,8 @@ impl Conditioner {
                 (0, _) => 1,
                 (window, _) => window.max(PRIMING),
             },
-            primed: false,
+            primed: batch_line.is_some(),
+            batch_line,
             finishing: false,
             trim: (settings.start.is_some() || settings.until.is_some()).then(|| {
                 (
@@ -138,6 +166,11 @@ impl Conditioner {
                     settings.until.map_or(i64::MAX, secs_to_nanos),
                 )
             }),
+            is_followed: settings.repair == StampRepair::Auto
+                && !matches!(settings.clock, Clock::Index { .. }),
+            is_compared: settings.repair == StampRepair::Auto
+                && settings.has_arrival
+                && matches!(settings.clock, Clock::Header),
             zero: None,
             state: State::default(),
             report: Report::default(),
@@ -197,6 +230,13 @@ impl Conditioner {
         };
         match stamp {
             Some(stamp) if stamp.0.unsigned_abs() <= MAX_STAMP as u64 => {
+                let stamp = match self.is_followed {
+                    true => self.followed(stamp),
+                    false => stamp,
+                };
+                if stamp.0.unsigned_abs() > MAX_STAMP as u64 {
+                    return self.reject(Verdict::FarStamp, index, Some(stamp));
+                }
                 if (stamp.0 == 0 || self.zero.is_some())
                     && self.index_clock.is_none()
                     && self.is_zero_in_doubt(raw, stamp, index, out)
@@ -298,9 +338,18 @@ impl Conditioner {
                 }
                 continue;
             }
+            if self.is_compared {
+                self.compare();
+            }
+            let line = self.order.line.as_slice();
             let Some((entry, ahead)) = line.get(i..).and_then(<[_]>::split_first) else {
                 return;
             };
+            if let Some(batch_line) = &mut self.batch_line {
+                let at = Nanos(batch_line.push(entry.stamp.0));
+                self.time_one(*entry, at, out);
+                continue;
+            }
             let is_alone = match ahead.first() {
                 Some(next) => next.stamp != entry.stamp || next.epoch != entry.epoch,
                 // The end, or live: nothing to wait for.

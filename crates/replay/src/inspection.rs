@@ -6,9 +6,9 @@ use crate::finding::Finding;
 use crate::summary::TopicSummary;
 use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::condition::stillness::{self, Rests};
-use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::condition::{Clock, ClockSet, GyroUnit};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
+use strapd_attitude::estimate::{Aid, Aiding, ClockVerdict, Meaning, Plan};
 use strapd_attitude::record::{Counts, RawSample};
 use strapd_recording::MadeBefore;
 use strapd_recording::recording::beside::TopicOfVectors;
@@ -39,6 +39,10 @@ pub struct Inspection {
     pub bias: Option<stillness::BiasEstimate>,
     /// Outcomes of its samples in a run by default.
     pub counts: Counts,
+    /// Steps of its stamp clock that the recorder's did not make.
+    pub clock_set: Option<ClockSet>,
+    /// Batches in its stamps, and their speed by the recorder's clock.
+    pub clocks: ClockVerdict,
     /// Payloads that could not be decoded.
     pub undecodable: u64,
     /// The clock the statistics are on.

@@ -8,6 +8,7 @@ pub mod aid;
 pub mod calendar;
 pub mod calibrating;
 pub mod calibration;
+pub(crate) mod clocks;
 pub mod gaps;
 mod rows;
 pub mod series;

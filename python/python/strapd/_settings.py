@@ -19,6 +19,7 @@ Aid = Literal["auto", "none", "gravity", "gravity+mag"]
 class Settings(TypedDict, total=False):
     """What can be said of a sensor and of the run, under the names of the command's flags (``docs/settings.md``)."""
 
+    stamps: Optional[Literal["auto", "as-recorded"]]
     window: Optional[int]
     order: Union[int, str, None]
     accel_sign: Optional[Literal["specific", "kinematic"]]
@@ -54,6 +55,7 @@ SETTINGS = frozenset(
     (
         "time",
         "rate_hz",
+        "stamps",
         "method",
         "window",
         "order",
@@ -92,6 +94,7 @@ SETTINGS = frozenset(
 #: Those that the environment may say too, with its variables.
 ENVIRONMENT = {
     "time": "STRAPD_TIME",
+    "stamps": "STRAPD_STAMPS",
     "method": "STRAPD_METHOD",
     "sample_kind": "STRAPD_SAMPLE_KIND",
     "aid": "STRAPD_AID",

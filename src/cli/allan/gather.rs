@@ -5,7 +5,7 @@ use crate::report::summary::significant;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
-use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock};
+use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock_as};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::Plan;
@@ -192,7 +192,7 @@ impl Gathering {
 
     fn begin(&mut self) -> std::result::Result<(), Diagnostic> {
         let first = std::mem::take(&mut self.first);
-        let (clock, warning) = choose_clock(&first, self.plan.clock);
+        let (clock, warning) = choose_clock_as(&first, self.plan.clock, self.plan.stamps);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
             return Err(Diagnostic::from(&fatal));
         }

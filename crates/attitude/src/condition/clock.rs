@@ -3,6 +3,21 @@
 //! A stage of its own because a sample carries up to three clocks, of which any can be absent,
 //! zero or standing still, and the choice decides every interval after it.
 
+mod batch_line;
+mod batches;
+mod line;
+mod speed;
+mod steps;
+mod unwrap;
+
+pub(super) use batch_line::BatchLine;
+pub use batches::{BatchRate, Batches, batches};
+pub use speed::{ClockSpeed, SpeedPass, SpeedVerdict};
+pub(super) use steps::ClockSteps;
+pub use unwrap::Period;
+pub(super) use unwrap::Turns;
+
+use super::settings::StampRepair;
 use crate::diagnostic::Diagnostic;
 use crate::record::{Nanos, RawSample};
 use crate::setting::{RATE_HZ, TIME};
@@ -72,6 +87,13 @@ pub enum ClockWarning {
         /// Number of samples looked at.
         looked_at: usize,
     },
+    /// The clock stands still, or counts in another unit, by the recorder's: no gyro samples so fast, or so slowly.
+    Speed {
+        /// Name of the clock.
+        clock: &'static str,
+        /// Speed of the clock.
+        found: SpeedFault,
+    },
     /// Neither the clock asked for nor the log time advances: only `--time index` can work.
     NoneMoves,
 }
@@ -93,6 +115,9 @@ impl From<&ClockWarning> for Diagnostic {
                 "{looked_at} of {looked_at} {clock} stamps are {} ns: that clock stands still, using the log time",
                 at.0
             ),
+            ClockWarning::Speed { clock, found } => {
+                format!("{clock} stamps {found}: using the log time")
+            }
             ClockWarning::NoneMoves => {
                 return Diagnostic::new(
                     "neither the message stamps nor the log time advance: integration needs time",
@@ -122,10 +147,23 @@ impl std::fmt::Display for ClockWarning {
 /// said about a clock that stands still, only about one that is absent or zero.
 #[must_use]
 pub fn choose_clock(prefix: &[RawSample], requested: Clock) -> (Clock, Option<ClockWarning>) {
+    choose_clock_as(prefix, requested, StampRepair::Auto)
+}
+
+/// The same, where stamps as recorded are believed at any speed.
+#[must_use]
+pub fn choose_clock_as(
+    prefix: &[RawSample],
+    requested: Clock,
+    repair: StampRepair,
+) -> (Clock, Option<ClockWarning>) {
     if matches!(requested, Clock::Index { .. }) || prefix.is_empty() {
         return (requested, None);
     }
-    let Some(fault) = fault(prefix, requested) else {
+    let Some(fault) = fault(prefix, requested).or_else(|| match repair {
+        StampRepair::Auto => speed_fault(prefix, requested),
+        StampRepair::AsRecorded => None,
+    }) else {
         return (requested, None);
     };
     let log_fault = self::fault(prefix, Clock::Log);
@@ -135,6 +173,60 @@ pub fn choose_clock(prefix: &[RawSample], requested: Clock) -> (Clock, Option<Cl
         return (Clock::Log, warning);
     }
     (Clock::Log, Some(fault))
+}
+
+/// Speed at which a stamp clock cannot be that of a sensor.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SpeedFault {
+    /// Nanoseconds in a second of the recorder's clock.
+    pub nanos_a_second: i64,
+    /// Whether it is a clock in another unit, not one that stands still.
+    pub is_unit: bool,
+}
+
+impl std::fmt::Display for SpeedFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let secs = self.nanos_a_second as f64 * 1e-9;
+        match (self.is_unit, self.nanos_a_second < 1_000_000_000) {
+            (false, _) => write!(
+                f,
+                "advance by {} ns in a second of the recorder's clock: that clock stands still",
+                self.nanos_a_second
+            ),
+            (true, true) => write!(
+                f,
+                "advance by {secs:.2e} s in a second of the recorder's clock: their unit is {:.0} times larger",
+                1.0 / secs.max(1e-9)
+            ),
+            (true, false) => write!(
+                f,
+                "advance by {secs:.0} s in a second of the recorder's clock: their unit is {secs:.0} times smaller"
+            ),
+        }
+    }
+}
+
+/// A header clock that stands still, or counts in another unit, while the recorder's goes on as a sensor does.
+fn speed_fault(prefix: &[RawSample], clock: Clock) -> Option<ClockWarning> {
+    if clock != Clock::Header {
+        return None;
+    }
+    let mut pass = SpeedPass::default();
+    let stamped = prefix.iter().filter_map(|raw| Some((raw.header?, raw.log)));
+    stamped.for_each(|(stamp, log)| pass.push(stamp.0, log.0));
+    let found = pass.finish()?;
+    let is_unit = match found.verdict {
+        SpeedVerdict::Unit => true,
+        SpeedVerdict::Frozen => false,
+        _ => return None,
+    };
+    Some(ClockWarning::Speed {
+        clock: clock.name(),
+        found: SpeedFault {
+            nanos_a_second: (found.speed * 1e9).round() as i64,
+            is_unit,
+        },
+    })
 }
 
 fn fault(prefix: &[RawSample], clock: Clock) -> Option<ClockWarning> {
@@ -202,5 +294,42 @@ impl IndexClock {
             .saturating_mul(self.whole)
             .saturating_add((n as f64 * self.fraction).round() as i64);
         Nanos(base.0.saturating_add(after))
+    }
+}
+
+#[cfg(test)]
+mod stream_tests;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn prefix(header: impl Fn(i64) -> i64) -> Vec<RawSample> {
+        let t0 = 1_650_000_000_000_000_000;
+        (0..512)
+            .map(|i| RawSample {
+                header: Some(Nanos(header(i * 5_000_000))),
+                log: Nanos(t0 + i * 5_000_000 + i % 7 * 300_000),
+                ..RawSample::default()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn stamps_that_no_sensor_has_give_way_to_the_log_time() {
+        // Seconds that stay, nanoseconds that count seconds; microseconds, and picoseconds, for nanoseconds.
+        let cases: [(fn(i64) -> i64, &str); 3] = [
+            (|t| 1_751_654_798 + t / 1_000_000_000 * 1000, "stands still"),
+            (|t| 7_000_000 + t / 1000, "1000 times larger"),
+            (|t| 7_000_000 + t * 1000, "1000 times smaller"),
+        ];
+        for (header, expected) in cases {
+            let (clock, warning) = choose_clock(&prefix(header), Clock::Header);
+            assert_eq!(clock, Clock::Log);
+            let said = warning.map(|w| w.to_string()).unwrap_or_default();
+            assert!(said.contains(expected), "{said}");
+        }
+        let (clock, warning) = choose_clock(&prefix(|t| t + t / 50), Clock::Header);
+        assert_eq!((clock, warning), (Clock::Header, None));
     }
 }

@@ -49,7 +49,12 @@ impl Memory {
             self.last,
         ];
         let entries = || order.suspects.iter().chain(&self.untimed);
-        stamps
+        self.state.turns.is_plausible()
+            && self.state.against_arrival.is_plausible()
+            && [self.state.set.0, self.state.set.1]
+                .iter()
+                .all(|set| (-MAX_STAMP..=MAX_STAMP).contains(set))
+            && stamps
             .into_iter()
             .flatten()
             .chain(entries().map(|entry| entry.stamp))
@@ -73,7 +78,11 @@ impl Conditioner {
     pub fn memory(&self) -> Option<Memory> {
         let (order, untimed) = (self.order.state(), self.order.untimed());
         let waiting = untimed.len().max(order.suspects.len());
-        if self.zero.is_some() || !self.primed || waiting > MOST_WAITING {
+        if self.batch_line.is_some()
+            || self.zero.is_some()
+            || !self.primed
+            || waiting > MOST_WAITING
+        {
             return None;
         }
         Some(Memory {
@@ -133,7 +142,8 @@ impl Conditioner {
             0 => near.0.abs() <= super::ZERO_IS_CLOSE_NANOS,
             stamp => stamp.unsigned_abs() <= MAX_STAMP as u64,
         };
-        self.clock.read(raw).filter(is_one)
+        let stamp = self.clock.read(raw)?;
+        Some(self.followed_near(stamp, near)).filter(is_one)
     }
 
     /// A sample came that its sender has sent before: it is counted, and nothing else.
@@ -188,8 +198,8 @@ mod tests {
             );
 
             let keys: Vec<&String> = text.as_object().unwrap().keys().collect();
-            let all = "epoch first floor high index index_base last previous rejected steps suspects trimmed_from \
-                       untimed";
+            let all = "against_arrival epoch first floor high index index_base last previous rejected set steps \
+                       suspects trimmed_from turns untimed";
             assert_eq!(keys, all.split_whitespace().collect::<Vec<_>>());
             text["of_a_later_release"] = 1.into();
             assert!(serde_json::from_value::<Memory>(text).is_err());

@@ -58,6 +58,8 @@ pub(super) struct Order {
     max_gap_nanos: i64,
     /// Nothing waits to be put in order.
     is_live: bool,
+    /// Samples share stamps because they came together: equal ones are no repeats.
+    is_shared: bool,
 }
 
 /// State of an [`Order`] beside its line. A new field is added here alone, with `serde(default)`.
@@ -88,7 +90,7 @@ impl Past {
 }
 
 impl Order {
-    pub(super) fn new(window: usize, max_gap_nanos: i64) -> Self {
+    pub(super) fn new(window: usize, max_gap_nanos: i64, is_shared: bool) -> Self {
         Order {
             past: Vec::new(),
             line: Vec::new(),
@@ -98,6 +100,7 @@ impl Order {
             max_run: window.max(MAX_RUN),
             max_gap_nanos,
             is_live: window == 0,
+            is_shared,
         }
     }
 
@@ -130,6 +133,16 @@ impl Order {
         if epoch == self.state.epoch {
             self.state.floor = Some(stamp);
         }
+    }
+
+    /// Takes `jump` off the stamps of the entries that were not timed yet: their clock was set by so much.
+    #[cold]
+    pub(super) fn rebase(&mut self, jump: i64) {
+        let less = |stamp: &mut Nanos| stamp.0 = stamp.0.saturating_sub(jump);
+        let untimed = self.line.iter_mut().skip(self.cursor);
+        let waiting = untimed.chain(&mut self.state.suspects);
+        waiting.for_each(|e| less(&mut e.stamp));
+        self.state.high.iter_mut().for_each(less);
     }
 
     /// Takes the next entry; `spacing` is the ordinary step.
@@ -231,7 +244,7 @@ impl Order {
     /// Whether the current epoch holds this very measurement at this very stamp.
     fn is_repeat(&self, entry: &Entry) -> bool {
         let (past, line) = self.sharing(entry.stamp);
-        if past.len() + line.len() >= TOO_COARSE {
+        if self.is_shared || past.len() + line.len() >= TOO_COARSE {
             return false;
         }
         let digest = (!past.is_empty()).then(|| Past::of(entry).digest);
@@ -471,7 +484,7 @@ mod tests {
         let mut counted = 0;
         for seed in 1..=200 {
             let entries = faulty(seed);
-            let live = Order::new(0, 5_000_000);
+            let live = Order::new(0, 5_000_000, false);
             let whole = Order {
                 is_live: false,
                 ..live.clone()

@@ -9,9 +9,10 @@ mod summary;
 pub use gravity::GyroAgainstGravity;
 pub use summary::{AxisStats, GravityAxis, OffsetStats, SpacingStats};
 
-use super::clock::Clock;
+use super::clock::{Clock, Turns};
 use super::histogram::Histogram;
 use super::regularise::{Lines, Uneven};
+use super::report::Wraps;
 use crate::record::{Nanos, RawSample};
 use gravity::GravityTrack;
 use nalgebra::Vector3;
@@ -60,6 +61,8 @@ pub struct QualitySummary {
     pub duplicates: u64,
     /// Number of these with other data than it.
     pub collisions: u64,
+    /// Wraps of the counter behind the stamps; what else is said of stamps is so of those that go on.
+    pub wraps: Option<Wraps>,
     /// Samples older than one before them.
     pub disorder: u64,
     /// Header minus log time; `None` without header stamps.
@@ -115,6 +118,7 @@ pub struct Quality {
     clock: Clock,
     /// Counts, in the place where they are read.
     so_far: QualitySummary,
+    turns: Turns,
     last: Option<Nanos>,
     primer: Vec<i64>,
     nominal: Option<i64>,
@@ -162,6 +166,7 @@ impl Quality {
         Quality {
             clock,
             so_far: QualitySummary::default(),
+            turns: Turns::default(),
             last: None,
             primer: Vec::new(),
             nominal: None,
@@ -193,7 +198,7 @@ impl Quality {
         self.so_far.with_interval += u64::from(raw.interval_nanos.is_some());
         let stamp = match self.clock {
             Clock::Index { rate_hz } => Some(Nanos((index as f64 * 1e9 / rate_hz) as i64)),
-            clock => clock.read(raw),
+            clock => clock.read(raw).map(|stamp| self.followed(stamp)),
         };
         match stamp {
             Some(stamp) => {
@@ -210,6 +215,16 @@ impl Quality {
         {
             self.push_window(stamp, &gyro, accel);
         }
+    }
+
+    /// The stamp on the turn of its counter.
+    fn followed(&mut self, stamp: Nanos) -> Nanos {
+        let (followed, wrap) = self.turns.push(stamp.0);
+        let followed = Nanos(followed);
+        if let Some(period) = wrap {
+            self.so_far.wraps = Some(Wraps::after(self.so_far.wraps, period, followed));
+        }
+        followed
     }
 
     fn push_stamp(&mut self, stamp: Nanos, gyro: Option<[f64; 3]>) {

@@ -3,6 +3,7 @@
 //! A stage of its own because bad data never ends a run: this is where it is accounted for, in
 //! bounded memory, with the first case of each kind kept so that a message can point at it.
 
+use super::clock::Period;
 use crate::record::{Counts, Join, Nanos, Verdict};
 
 /// Number of gaps kept one by one; all are counted.
@@ -81,6 +82,39 @@ pub struct FirstBad {
     pub stamp: Option<Nanos>,
 }
 
+/// Wraps of the counter that the stamps are read from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Wraps {
+    /// Number of wraps.
+    pub count: u64,
+    /// Period of the last one.
+    pub period: Period,
+    /// Stamp, on the line of those before it, with which the first turn ended.
+    pub first: Nanos,
+}
+
+/// Steps of the stamp clock, which the arrival clock did not make.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ClockSet {
+    /// Number of steps.
+    pub count: u64,
+    /// Largest of them, nanoseconds; positive: ahead.
+    pub largest_nanos: i64,
+    /// Recorded stamp behind the first, less the steps before it.
+    pub first: Nanos,
+}
+
+impl Wraps {
+    /// Wraps with one more after `before`.
+    pub(super) fn after(before: Option<Wraps>, period: Period, at: Nanos) -> Wraps {
+        Wraps {
+            count: before.map_or(1, |wraps| wraps.count.saturating_add(1)),
+            period,
+            first: before.map_or(at, |wraps| wraps.first),
+        }
+    }
+}
+
 /// Outcome of a stream.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Report {
@@ -97,6 +131,10 @@ pub struct Report {
     /// The step of the clock, nanoseconds, where it is coarser than the sensor's: its samples were spread
     /// over it.
     pub coarse_nanos: Option<i64>,
+    /// Wraps of the counter behind the stamps, which went on; `None` where there were none.
+    pub wraps: Option<Wraps>,
+    /// Steps of the stamp clock by the arrival clock, taken off; `None` where there were none.
+    pub clock_set: Option<ClockSet>,
     /// Stamp of the first sample used.
     pub first: Option<Nanos>,
     /// Stamp of the last sample used so far.
@@ -131,6 +169,24 @@ impl Report {
         .into_iter()
         .map(|v| self.counts.get(v))
         .sum()
+    }
+
+    #[cold]
+    pub(super) fn note_wrap(&mut self, period: Period, at: Nanos) {
+        self.wraps = Some(Wraps::after(self.wraps, period, at));
+    }
+
+    #[cold]
+    pub(super) fn note_set(&mut self, jump: i64, at: Nanos) {
+        let set = self.clock_set.get_or_insert(ClockSet {
+            count: 0,
+            largest_nanos: 0,
+            first: at,
+        });
+        set.count = set.count.saturating_add(1);
+        if jump.saturating_abs() > set.largest_nanos.saturating_abs() {
+            set.largest_nanos = jump;
+        }
     }
 
     #[cold]

@@ -3,7 +3,7 @@
 //! A stage of its own so that everything outside can be wrong about a sensor is checked once,
 //! before the first sample, and the hot path needs no checks.
 
-use super::clock::Clock;
+use super::clock::{BatchRate, Clock};
 use crate::frames::{AxisMap, Body, Dcm, Sensor};
 use crate::quaternion::BodyRate;
 use crate::record::{GyroUnit, SampleKind};
@@ -87,6 +87,34 @@ pub struct Settings {
     /// first samples, colliding stamps and stamps that catch up are judged with their successors
     /// in view). 0 = live: every sample with a new stamp leaves at once, late ones are dropped.
     pub reorder_window: usize,
+    /// Whether stamps are followed through what counters and clocks do to them.
+    pub repair: StampRepair,
+    /// Whether the log times tell when samples arrived, the same in every run: those of a recording do.
+    pub has_arrival: bool,
+    /// The rate of samples that were stamped when their batch came, where a pass over the recording found one.
+    pub batches: Option<BatchRate>,
+}
+
+/// Treatment of stamps whose clock does not run on evenly (`--stamps`).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum StampRepair {
+    /// Stamps go on where their counter wraps, and where their clock was set while that of the recorder went on; those
+    /// of batches are spread; those that stand still give way to the log time.
+    #[default]
+    Auto,
+    /// Stamps as recorded.
+    AsRecorded,
+}
+
+impl StampRepair {
+    /// The name used by `--stamps`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            StampRepair::Auto => "auto",
+            StampRepair::AsRecorded => "as-recorded",
+        }
+    }
 }
 
 impl Default for Settings {
@@ -110,6 +138,9 @@ impl Default for Settings {
             start: None,
             until: None,
             reorder_window: Settings::REPLAY_WINDOW,
+            repair: StampRepair::Auto,
+            has_arrival: true,
+            batches: None,
         }
     }
 }
@@ -154,6 +185,10 @@ impl Settings {
             start,
             until,
             reorder_window,
+            repair,
+            // What was saved is of one daemon, which has none.
+            has_arrival: _,
+            batches: _,
         } = self;
         let (axes, mount) = (axes.matrix(), mount.as_matrix());
         write!(
@@ -164,10 +199,13 @@ impl Settings {
              bias: {bias:?}, gyro_range: {gyro_range:?}, start: {start:?}, until: {until:?}, \
              reorder_window: {reorder_window:?} }}"
         )?;
-        // Nothing where there is none: what was saved before there was one goes on.
-        match *gyro_scale == [1.0; 3] {
-            true => Ok(()),
-            false => write!(out, " gyro_scale: {gyro_scale:?}"),
+        // Nothing for what is not set: what was saved before there was one goes on.
+        if *gyro_scale != [1.0; 3] {
+            write!(out, " gyro_scale: {gyro_scale:?}")?;
+        }
+        match repair {
+            StampRepair::Auto => Ok(()),
+            StampRepair::AsRecorded => write!(out, " stamps: {repair:?}"),
         }
     }
 

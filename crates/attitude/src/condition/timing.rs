@@ -106,6 +106,16 @@ impl Timing {
         self.previous = previous;
     }
 
+    /// The ordinary step is this, nanoseconds: known before the first entry.
+    pub(super) fn expect(&mut self, step: f64) {
+        self.spacing.prime(&mut [step.round() as i64; 16]);
+    }
+
+    /// Time goes on into `epoch`: its clock was set by what has been taken off.
+    pub(super) fn join_epoch(&mut self, epoch: u32) {
+        self.previous.iter_mut().for_each(|p| p.epoch = epoch);
+    }
+
     /// Ordinary steps, as far as they are known.
     pub(super) fn steps(&self) -> Steps {
         self.spacing.steps()

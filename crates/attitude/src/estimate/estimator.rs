@@ -346,6 +346,7 @@ impl Estimator {
         let (Some(force), Some(stamp)) = (raw.accel, besides.clock.read(raw)) else {
             return;
         };
+        let stamp = self.conditioner.of_auxiliary(stamp);
         match besides.forces {
             Forces::WithRates => return,
             Forces::Beside => {}
@@ -370,6 +371,7 @@ impl Estimator {
         let Some((field, stamp)) = raw.mag.zip(besides.clock.read(raw)) else {
             return;
         };
+        let stamp = self.conditioner.of_auxiliary(stamp);
         let (field, lead) = besides.resolved.field(field);
         let stamp = Nanos(stamp.0.saturating_add((lead * 1e9).round() as i64));
         let place = self.rates.len();
@@ -605,6 +607,8 @@ fn conditioning(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> conditi
     condition::Settings {
         accel_scale: settings.accel_scale * scale,
         truncation_step: prepared.truncation_step,
+        has_arrival: prepared.has_arrival,
+        batches: prepared.batches,
         ..settings
     }
 }

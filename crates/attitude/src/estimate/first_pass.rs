@@ -6,7 +6,7 @@
 use super::meaning::Meaning;
 use super::plan::Plan;
 use crate::condition::stillness::{Limits, Rests, Stillness};
-use crate::condition::{Conditioner, choose_clock};
+use crate::condition::{ClockSet, Conditioner, choose_clock_as};
 use crate::diagnostic::Diagnostic;
 use crate::quaternion::BodyRate;
 use crate::record::{Counts, RateSample, RawSample};
@@ -68,6 +68,12 @@ impl Conditioned {
         running.map_or_else(Counts::default, |conditioner| conditioner.report().counts)
     }
 
+    /// Steps of the stamp clock that were taken off so far.
+    #[must_use]
+    pub fn clock_set(&self) -> Option<ClockSet> {
+        self.running.as_ref()?.report().clock_set
+    }
+
     /// Hands on what is left.
     ///
     /// # Errors
@@ -85,7 +91,7 @@ impl Conditioned {
 
     fn begin(&mut self) -> Result<(), Diagnostic> {
         let gathered = std::mem::take(&mut self.gathered);
-        let (clock, _) = choose_clock(&gathered, self.plan.clock);
+        let (clock, _) = choose_clock_as(&gathered, self.plan.clock, self.plan.stamps);
         let settings = self
             .resolved
             .conditioning(&self.plan, clock, BodyRate::ZERO);

@@ -135,6 +135,7 @@ impl Meaning {
             gyro_range: plan.gyro_range,
             start: plan.start,
             until: plan.until,
+            repair: plan.stamps,
             ..Settings::default()
         }
     }

@@ -4,7 +4,7 @@
 //! here, before the data are looked at.
 
 use super::sensor_calibration::SensorCalibration;
-use crate::condition::{self, Clock, GyroUnit, OnGap};
+use crate::condition::{self, Clock, GyroUnit, OnGap, StampRepair};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{AxisMap, Body, BodyAxes, Nav, Sensor};
 use crate::propagate::{self, Method, Propagator};
@@ -70,6 +70,9 @@ pub struct Plan {
     /// it is repeated as given). Default: `None`, the Earth's rotation stays in the rates as a bias of 15 deg/h.
     /// Setting `earth_rate`.
     pub latitude_deg: Option<f64>,
+    /// Treatment of stamps whose counter wraps, whose clock was set or stands still, or that batches were given when they
+    /// came. Default: [`StampRepair::Auto`].
+    pub stamps: StampRepair,
     /// Whether stamps that jitter are replaced by evenly spaced ones; only for a sensor that samples evenly. Default:
     /// `false`.
     pub regularise_stamps: bool,
@@ -164,6 +167,7 @@ impl Default for Plan {
             max_gap_secs: 0.5,
             on_gap: OnGap::Hold,
             latitude_deg: None,
+            stamps: StampRepair::Auto,
             regularise_stamps: false,
             gyro_range: None,
             noise: Noise::by_data(),

@@ -8,6 +8,7 @@ mod bias;
 use self::bias::{decide_bias, looks_for_bias, with_bias_of_rest};
 use super::aiding::Aiding;
 use super::class_pass::{self, ClassPass};
+use super::clock_pass::ClockPass;
 use super::first_pass::{FEW, MANY, RestPass};
 use super::intervals::Mismatch;
 use super::meaning::Meaning;
@@ -15,7 +16,7 @@ use super::plan::{Aid, Bias, Initial, Noise, Plan, Truncation};
 use super::stamps::{StampPass, Stamps};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::condition::truncation::Grid;
-use crate::condition::{Clock, ClockWarning, choose_clock};
+use crate::condition::{BatchRate, Clock, ClockWarning, choose_clock_as};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Method;
@@ -59,10 +60,14 @@ pub struct Prepared {
     pub world: World,
     /// Treatment of the stamps.
     pub stamps: Stamps,
+    /// Whether log times tell when samples arrived: those of a recording do, those of a daemon are another in every run.
+    pub has_arrival: bool,
     /// Aiding, if something corrects the attitude.
     pub aiding: Option<Aiding>,
     /// Step in which the driver cut the rates, rad/s, where that is undone.
     pub truncation_step: Option<f64>,
+    /// The rate of samples that were stamped when their batch came.
+    pub batches: Option<BatchRate>,
     /// Things to know.
     pub warnings: Vec<Diagnostic>,
 }
@@ -91,6 +96,8 @@ pub struct Preparation {
     rates: Option<Vec<[f64; 3]>>,
     /// The first specific forces that came in messages of their own.
     beside: Vec<RawSample>,
+    /// Stamps that may be those of batches.
+    clocks: Option<ClockPass>,
     /// Samples by which the class of the sensor is found.
     class: Option<ClassPass>,
     /// Whether there are any such forces; before the first sample.
@@ -116,6 +123,7 @@ impl Preparation {
                 && !matches!(resolved.kind, SampleKind::DeltaAngle | SampleKind::Rotation))
             .then(Vec::new),
             beside: Vec::new(),
+            clocks: ClockPass::of(plan).filter(|_| patience == Patience::WholeLog),
             class: ClassPass::of(plan).filter(|_| patience == Patience::WholeLog),
             forces_beside: [false; 2],
         }
@@ -155,6 +163,9 @@ impl Preparation {
         if let Some(class) = &mut self.class {
             class.take(raw);
         }
+        if let Some(clocks) = &mut self.clocks {
+            clocks.take(raw);
+        }
         match &mut self.rest {
             // What nobody asked for is not worth a pass over hours.
             Some(rest) if self.taken <= MANY || needs_rest(&self.plan) => {
@@ -191,10 +202,12 @@ impl Preparation {
             Patience::WholeLog => {
                 let wants_rates = self.rates.as_ref().is_some_and(|rates| rates.len() < MANY);
                 let wants_rest = needs_rest(&self.plan) || self.taken < MANY;
+                let wants_clocks = self.clocks.as_ref().is_some_and(ClockPass::wants_more);
                 let wants_class = self.class.as_ref().is_some_and(ClassPass::wants_more);
                 (self.rest.is_some() && wants_rest)
                     || self.stamps.is_some()
                     || wants_rates
+                    || wants_clocks
                     || wants_class
             }
             Patience::FirstMinute => {
@@ -221,14 +234,17 @@ impl Preparation {
             rates,
             beside,
             forces_beside,
+            clocks,
             class,
             ..
         } = self;
-        let (clock, warning) = choose_clock(&first, plan.clock);
+        let (clock, warning) = choose_clock_as(&first, plan.clock, plan.stamps);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
             return Err(Diagnostic::from(&fatal));
         }
         let mut warnings: Vec<Diagnostic> = warning.iter().map(Diagnostic::from).collect();
+        let clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
+        warnings.extend(clocks.of_batches.into_iter().chain(clocks.of_speed));
         if let Some(mismatch) = Mismatch::between(&first, clock, resolved.kind) {
             if !resolved.interval_unit_given {
                 return Err(mismatch.refusal(resolved.interval.as_ref()));
@@ -331,6 +347,8 @@ impl Preparation {
             world_rate: earth.map_or_else(|| In::assume(Vector3::zeros()), |e| e.w_ie),
             world,
             stamps,
+            has_arrival: true,
+            batches: clocks.batches,
             warnings,
         };
         let told = class.zip(prepared.aiding).and_then(|(class, aiding)| {
@@ -426,6 +444,8 @@ pub fn at_once(
         Stamps::AsRecorded
     };
     Ok(Prepared {
+        has_arrival: false,
+        batches: None,
         noise: plan.noise.taken(),
         aiding,
         truncation_step: decide_truncation(plan, None, &mut warnings)?,

@@ -49,9 +49,10 @@ struct Seen<'a> {
 type Rule = fn(&Seen<'_>, &mut Vec<Finding>);
 
 /// The rules, in the order of what they find.
-const RULES: [Rule; 16] = [
+const RULES: [Rule; 17] = [
     rows,
     clock,
+    stamps::clocks,
     degrees,
     gravity::turns_otherwise,
     stamps::stand_still,

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Stillness};
-use strapd_attitude::condition::{Clock, GyroUnit, choose_clock};
+use strapd_attitude::condition::{Clock, GyroUnit, choose_clock_as};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
+use strapd_attitude::estimate::{ClockPass, Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
 use strapd_recording::decode::Options;
@@ -56,6 +56,7 @@ struct TopicInspector {
     conditioned: Conditioned,
     stillness: Stillness,
     stamps: regularise::Survey,
+    clocks: Option<ClockPass>,
     undecodable: u64,
     plan: Plan,
     aid: Aids,
@@ -99,6 +100,9 @@ impl TopicInspector {
             }
             return Ok(());
         }
+        if let Some(clocks) = &mut self.clocks {
+            clocks.take(raw);
+        }
         self.conditioned.push(std::slice::from_ref(raw), |sample| {
             self.stillness.push(sample);
             self.stamps.push(sample);
@@ -115,7 +119,7 @@ impl TopicInspector {
     }
 
     fn settle(&mut self) {
-        let (clock, warning) = choose_clock(&self.first, self.asked);
+        let (clock, warning) = choose_clock_as(&self.first, self.asked, self.plan.stamps);
         self.quality = Quality::new(clock);
         self.aid = Aids::of(&self.plan, &self.resolved, &self.first, &self.beside);
         for raw in self.first.drain(..) {
@@ -150,6 +154,11 @@ impl TopicInspector {
             bias: stillness::estimate_bias(&rests, &Limits::default()).ok(),
             rests,
             counts,
+            clock_set: self.conditioned.clock_set(),
+            clocks: self
+                .clocks
+                .map(|pass| pass.finish(clock))
+                .unwrap_or_default(),
             undecodable: self.undecodable,
             clock,
             clock_warning,
@@ -316,6 +325,7 @@ fn begin(of_topic: &TopicPlan<'_>, plan: &Plan) -> Option<TopicInspector> {
         asked: plan.clock,
         stillness: Stillness::new(Limits::default()),
         stamps: regularise::Survey::new(),
+        clocks: ClockPass::of(plan),
         resolved,
         undecodable: 0,
         plan: plan.clone(),

@@ -5,6 +5,7 @@
 
 use super::against::{Against, Recorded, against_text};
 use super::aid::FilterSummary;
+use super::clocks::{clock_set_row, clock_was_set, wraps_row};
 use super::gaps::Gaps;
 use super::rows::{self, Row};
 use super::series::Drawn;
@@ -14,6 +15,7 @@ use super::stamps::Regularised;
 use super::{meaning, significant};
 use crate::finding::{Finding, Severity};
 use serde_json::{Map, Value, json};
+use strapd_attitude::condition::{ClockSet, Wraps};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, SensorCalibration, learned};
 use strapd_attitude::frames::AxisMap;
@@ -48,6 +50,10 @@ pub struct TopicSummary {
     pub rate_hz: Option<f64>,
     /// The clock the samples were placed on.
     pub clock: String,
+    /// Wraps of the counter behind the stamps.
+    pub wraps: Option<Wraps>,
+    /// Steps of the stamp clock that the arrival clock did not make.
+    pub clock_set: Option<ClockSet>,
     /// Outcome of the stamps, if `--regularise-stamps` asked for it.
     pub stamps: Option<Regularised>,
     /// Kind for which a sample was taken.
@@ -142,6 +148,8 @@ impl TopicSummary {
                 .filter(|n| *n > 0)
                 .map(|n| 1e9 / n as f64),
             clock: prepared.clock.name().to_owned(),
+            wraps: conditioning.wraps,
+            clock_set: conditioning.clock_set,
             stamps: estimator
                 .regularising()
                 .map(|(causal, report)| Regularised::of(causal, &report, first)),
@@ -182,7 +190,12 @@ impl TopicSummary {
             final_wxyz: q.wxyz(),
             final_ypr: [angles.yaw, angles.pitch, angles.roll],
             final_sigma: last.map_or([0.0; 3], |s| s.covariance.sigma().into()),
-            findings: prepared.warnings.iter().map(warning).collect(),
+            findings: prepared
+                .warnings
+                .iter()
+                .map(warning)
+                .chain(conditioning.clock_set.map(clock_was_set))
+                .collect(),
             ..TopicSummary::default()
         }
     }
@@ -217,6 +230,8 @@ impl TopicSummary {
             Row::value("duration_s", self.duration_secs),
             Row::value("rate_hz", self.rate_hz),
             Row::value("clock", self.clock.as_str()),
+            wraps_row(self.wraps, self.span),
+            clock_set_row(self.clock_set),
             Row::value(
                 "regularised_stamps",
                 self.stamps.as_ref().map(Regularised::json),

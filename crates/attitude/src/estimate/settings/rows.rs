@@ -1,7 +1,9 @@
 //! The table itself, in the order in which rows are applied and help lists them.
 
 use super::{Default, Row, Takes, Word};
-use crate::condition::{Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES};
+use crate::condition::{
+    Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES, StampRepair,
+};
 use crate::diagnostic::Diagnostic;
 use crate::estimate::plan::{
     Aid, Bias, CLASS_BY_DATA, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise, Plan, Truncation,
@@ -43,7 +45,7 @@ const ROW: Row = Row {
 /// Every setting of an estimation.
 // A row is read as one; broken at 100 columns it is a page.
 #[rustfmt::skip]
-pub static ROWS: [Row; 34] = [
+pub static ROWS: [Row; 35] = [
     Row {
         setting: TIME,
         meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
@@ -71,6 +73,19 @@ pub static ROWS: [Row; 34] = [
             _ => Err(Diagnostic::new(format!("{RATE_HZ}: only {TIME} index uses it"))
                 .help(format!("{TIME} index {RATE_HZ} HZ"))),
         },
+        ..ROW
+    },
+    Row {
+        setting: STAMPS,
+        meaning: "Stamps that are not those of an even clock: auto (mended where the data prove it), as-recorded",
+        effect: "auto: stamps go on where a counter wraps, and where their clock was set while the recorder's went on; batches that were stamped when they came are spread evenly (files); a clock that stands still gives way to the log time. What is done is reported; other recordings are the same with both.",
+        default: Default::Value("auto"),
+        environment: Some("STRAPD_STAMPS"),
+        placeholder: "STAMPS",
+        words: &[
+            word(StampRepair::Auto.name(), "Mended where the data prove what happened", |p| p.stamps = StampRepair::Auto),
+            word(StampRepair::AsRecorded.name(), "As they are", |p| p.stamps = StampRepair::AsRecorded),
+        ],
         ..ROW
     },
     Row {

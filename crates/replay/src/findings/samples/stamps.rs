@@ -1,6 +1,7 @@
 //! Steps and clocks of the samples as recorded -> findings about their stamps. Pure.
 
 use super::{Finding, Seen, Severity};
+use crate::summary::clocks::clock_was_set;
 use crate::summary::significant;
 use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::condition::regularise::Lines;
@@ -35,6 +36,21 @@ pub(super) fn stand_still(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     }
 }
 
+/// A clock that was set, one of another speed, batches.
+pub(super) fn clocks(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let looked = seen.looked;
+    out.extend(looked.clock_set.map(clock_was_set));
+    let of_speed = looked.clocks.of_speed.as_ref();
+    out.extend(of_speed.map(|said| Finding::said(Severity::Error, "clock-speed", said)));
+    let of_batches = looked.clocks.of_batches.as_ref();
+    out.extend(of_batches.map(|said| Finding::said(Severity::Warning, "batches", said)));
+}
+
+/// Whether steps are those of batches, of which neither jitter nor missing samples can be told.
+fn are_of_batches(seen: &Seen<'_>) -> bool {
+    seen.looked.clocks.batches.is_some()
+}
+
 /// The 99th percentile of the jitter over the step, where it is worth a word.
 fn jitter_of_steps(q: &QualitySummary) -> Option<f64> {
     let spacing = q.spacing?;
@@ -52,7 +68,7 @@ fn noisy_lines(q: &QualitySummary) -> Option<&Lines> {
 /// Steps that jitter: about straight lines, about none, or as nobody has laid any.
 pub(super) fn jitter(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    let Some(share) = jitter_of_steps(q) else {
+    let Some(share) = jitter_of_steps(q).filter(|_| !are_of_batches(seen)) else {
         return;
     };
     let said = |more: &str| {
@@ -78,7 +94,7 @@ pub(super) fn jitter(seen: &Seen<'_>, out: &mut Vec<Finding>) {
 /// Stamps that jitter about straight lines, by less than single steps tell.
 pub(super) fn slight_jitter(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    if jitter_of_steps(q).is_none() {
+    if jitter_of_steps(q).is_none() && !are_of_batches(seen) {
         out.extend(noisy_lines(q).map(|lines| about_lines(seen, lines)));
     }
 }
@@ -111,7 +127,9 @@ fn about_lines(seen: &Seen<'_>, lines: &Lines) -> Finding {
 pub(super) fn drift(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
     let ppm = q.offset.map_or(0.0, |offset| offset.drift_ppm);
-    if q.duration_secs >= 60.0 && ppm.abs() > DRIFT_PPM {
+    // The wrong speed of a clock is no drift.
+    let is_wrong = seen.looked.clocks.of_speed.is_some();
+    if q.duration_secs >= 60.0 && ppm.abs() > DRIFT_PPM && !is_wrong {
         out.push(
             Finding::new(
                 Severity::Warning,
@@ -128,7 +146,7 @@ pub(super) fn drift(seen: &Seen<'_>, out: &mut Vec<Finding>) {
 /// Samples that are missing.
 pub(super) fn missing(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    if q.missing > 0 && lacks(q) {
+    if q.missing > 0 && lacks(q) && !are_of_batches(seen) {
         out.push(missing_samples(q.missing, q.longest_gap_secs, q.gaps));
     }
 }

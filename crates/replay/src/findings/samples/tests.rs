@@ -40,6 +40,8 @@ fn looked(raw: &[RawSample]) -> Inspection {
         rests: Default::default(),
         bias: None,
         counts,
+        clock_set: None,
+        clocks: Default::default(),
         undecodable: 0,
         clock: Clock::Header,
         clock_warning: None,
