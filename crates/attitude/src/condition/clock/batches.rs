@@ -20,6 +20,8 @@ const MOVING: f64 = 4.0;
 const SURELY: f64 = 10.0;
 /// Reading one more sample takes less, nanoseconds.
 const READING: f64 = 1e6;
+/// Steps of gyros, nanoseconds: the shortest and the longest.
+const STEPS: (f64, f64) = (20e3, 2e9);
 /// Fewest samples and batches that tell.
 const LEAST: usize = 24;
 const LEAST_BATCHES: usize = 5;
@@ -83,6 +85,10 @@ pub fn batches(stamps: &[i64], rates: &[[f64; 3]]) -> Batches {
             .collect();
         each.pop();
         h = median(&mut each);
+    }
+    if !(STEPS.0..=STEPS.1).contains(&h) {
+        // A clock that stands still, or another unit.
+        return Batches::None;
     }
     let usual = median(&mut took.clone());
     let whole = took.len().saturating_sub(1);
@@ -302,6 +308,12 @@ pub(super) mod tests {
             .map(|(s, off)| s + off)
             .collect();
         assert_eq!(batches(&jitter, &gyro(&jitter)), Batches::None);
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_makes_no_batches() {
+        let stamps: Vec<i64> = (0..6000).map(|i| T0 + i / 200 * 1000).collect();
+        assert_eq!(batches(&stamps, &gyro(&even(6000, H))), Batches::None);
     }
 
     #[test]
