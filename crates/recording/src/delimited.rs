@@ -15,6 +15,7 @@ mod layout;
 mod own;
 mod preamble;
 mod rows;
+mod time_of_day;
 
 pub use crate::columns::{Columns, Delimiter};
 pub use rows::Table;

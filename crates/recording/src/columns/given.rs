@@ -11,9 +11,10 @@ pub(crate) enum Role {
     Stamp,
     Step,
     Counter,
+    Sensor,
 }
 
-const ROLES: [(&str, Role); 9] = [
+const ROLES: [(&str, Role); 10] = [
     ("gyro", Role::Of(Kind::Gyro)),
     ("accel", Role::Of(Kind::Accel)),
     ("mag", Role::Of(Kind::Mag)),
@@ -23,13 +24,14 @@ const ROLES: [(&str, Role); 9] = [
     ("stamp", Role::Stamp),
     ("dt", Role::Step),
     ("counter", Role::Counter),
+    ("sensor", Role::Sensor),
 ];
 
 impl Role {
     fn parts(self) -> usize {
         match self {
             Role::Of(kind) => kind.parts(),
-            Role::Stamp | Role::Step | Role::Counter => 1,
+            Role::Stamp | Role::Step | Role::Counter | Role::Sensor => 1,
         }
     }
 
@@ -37,7 +39,7 @@ impl Role {
         match self {
             Role::Of(kind) => kind.quantity(),
             Role::Stamp | Role::Step => Some(Quantity::Time),
-            Role::Counter => None,
+            Role::Counter | Role::Sensor => None,
         }
     }
 }
@@ -61,6 +63,7 @@ pub(crate) struct Given {
 /// dv=VelInc_X:VelInc_Y:VelInc_Z the velocity that belongs to it, m/s
 /// dt=step:ms                    the time since the row before, where there is no stamp
 /// counter=PacketCounter         a running number, beside a rate in the file's head
+/// sensor=device                 the sensor of each row, where a table holds several
 /// accel=none                    not to be used
 /// ```
 #[derive(Clone, PartialEq, Debug)]
@@ -91,7 +94,7 @@ impl FromStr for Columns {
             let role = ROLES.iter().find(|(known, _)| *known == name.trim());
             let (name, role) = role.copied().ok_or_else(|| {
                 format!(
-                    "`{name}` is no role; they are gyro, accel, mag, orientation, dq, dv, stamp, dt, counter"
+                    "`{name}` is no role; they are gyro, accel, mag, orientation, dq, dv, stamp, dt, counter, sensor"
                 )
             })?;
             if given.iter().any(|before| before.role == role) {

@@ -66,10 +66,16 @@ pub(crate) enum Meant {
     Aside { kind: Kind, why: &'static str },
     /// A stamp.
     Stamp,
+    /// A time of day by its name: a stamp, where there is no other.
+    Clock,
+    /// A date, which may belong to a time of day.
+    Date,
     /// The time since the row before.
     Step,
     /// A running number.
     Counter,
+    /// Sensor of the row; where that is not clear, it may be another number as well.
+    Sensor { is_clear: bool },
     /// Column of no use.
     Nothing,
 }
@@ -212,6 +218,49 @@ const STAMP_WEAK: &[&str] = &[
     "in",
     "the",
 ];
+
+/// Names of a time of day, and of its date.
+const TIMES_OF_DAY: &[&str] = &["rtctime", "timeofday", "localtime", "clocktime", "gpstime"];
+const DATES: &[&str] = &[
+    "date",
+    "rtcdate",
+    "localdate",
+    "gpsdate",
+    "utcdate",
+    "datum",
+];
+
+/// Names of a column that says whose a row is.
+const SENSOR: &[&str] = &[
+    "device",
+    "deviceid",
+    "devicename",
+    "deviceaddress",
+    "devicemac",
+    "sensor",
+    "sensorid",
+    "sensorname",
+    "imu",
+    "imuid",
+    "imuname",
+    "mac",
+    "macaddress",
+    "tracker",
+    "trackerid",
+    "serial",
+    "serialnumber",
+    "nodeid",
+];
+/// The same of one that may as well be a number of the row, or of something else.
+const SENSOR_OR_NUMBER: &[&str] = &["id", "instance", "node", "address", "unit"];
+
+/// Whether a name, without what is between its words, says whose a row is, and whether that is clear.
+fn names_sensor(joined: &str) -> Option<bool> {
+    match SENSOR.contains(&joined) {
+        true => Some(true),
+        false => SENSOR_OR_NUMBER.contains(&joined).then_some(false),
+    }
+}
 
 /// Words of a name: cut at what is neither letter nor digit, and where capitals begin.
 fn words(text: &str) -> Vec<String> {
@@ -372,6 +421,15 @@ impl Name {
         let joined = all.concat();
         if ["counter", "packetcounter", "samplecounter"].contains(&joined.as_str()) {
             return (Meant::Counter, None, None);
+        }
+        if TIMES_OF_DAY.contains(&joined.as_str()) {
+            return (Meant::Clock, None, None);
+        }
+        if DATES.contains(&joined.as_str()) {
+            return (Meant::Date, None, None);
+        }
+        if let Some(is_clear) = names_sensor(&joined) {
+            return (Meant::Sensor { is_clear }, None, None);
         }
         if let [mat, row, column] = all
             && mat == "mat"

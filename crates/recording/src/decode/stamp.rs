@@ -158,7 +158,7 @@ pub(crate) fn from_rfc3339(text: &str) -> Option<Nanos> {
 
 /// Days since 1970-01-01 in the proleptic Gregorian calendar: years are counted from March, so that
 /// the leap day is the last of its year, and 400 of them have 146,097 days.
-fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
+pub(crate) fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let month_from_march = (month + 9) % 12;
     let day_of_year = (153 * month_from_march + 2) / 5 + day - 1;

@@ -3,6 +3,7 @@
 //! Apart from the rows because makers agree on nothing here: whole nanoseconds, decimal seconds, ticks that wrap,
 //! dates, a running number beside a rate, nothing.
 
+use super::time_of_day::Daily;
 use crate::decode::{decimal_in_steps, instant_of_date};
 use strapd_attitude::record::Nanos;
 
@@ -15,6 +16,8 @@ pub(super) enum Clock {
     Counts { nanos: f64, wraps: Option<Wraps> },
     /// A column of dates (RFC 3339).
     Dates,
+    /// A column of times of day.
+    Daily(Daily),
     /// A column of running numbers, so far apart.
     Counter { period: f64, wraps: Wraps },
     /// A column of steps since the row before, so many nanoseconds in one; their sum until now.
@@ -80,6 +83,7 @@ impl Clock {
                 }
             }
             Clock::Dates => instant_of_date(number).ok_or("is no date (RFC 3339)"),
+            Clock::Daily(daily) => daily.read(number).ok_or("is no time of day"),
             Clock::Counter { period, wraps } => {
                 let count = whole().ok_or("is no whole number")?;
                 Ok(at(wraps.unwrapped(count), *period))
@@ -93,6 +97,22 @@ impl Clock {
                 Ok(Nanos(*sum))
             }
             Clock::Rows { .. } | Clock::Nothing => Ok(Nanos(0)),
+        }
+    }
+
+    /// Midnight of the date in another column than the time.
+    pub(super) fn day(&self, cell: &str) -> Result<Nanos, &'static str> {
+        match self {
+            Clock::Daily(daily) => daily.day(cell).ok_or("is no date like those above"),
+            _ => Ok(Nanos(0)),
+        }
+    }
+
+    /// The instant of a row by its stamp and its day, which some clocks need.
+    pub(super) fn instant(&self, stamp: Option<Nanos>, day: Option<Nanos>) -> Option<Nanos> {
+        match self {
+            Clock::Daily(daily) if daily.needs_day() => Some(Nanos(stamp?.0 + day?.0)),
+            _ => stamp,
         }
     }
 

@@ -4,6 +4,8 @@
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Column {
     Stamp,
+    /// The day of a stamp that is a time of day.
+    Date,
     Log,
     Interval,
     Kind,

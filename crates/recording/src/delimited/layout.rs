@@ -6,9 +6,10 @@
 mod increments;
 mod instants;
 mod roles;
+mod sensors;
 
 use super::column::{Column, is_comment};
-use super::preamble::Preamble;
+use super::preamble::{Maker, Preamble};
 use super::rows::{LOST, Table};
 use crate::columns::Delimiter;
 use crate::columns::{Columns, Role};
@@ -34,7 +35,7 @@ const MOST_SAID: usize = 16;
 
 /// Whether a line names the columns of a table of rates or orientations.
 pub(crate) fn is_header(line: &[u8], given: Option<&Columns>) -> bool {
-    header_in(line, None, given, ("", Wanted::Rates)).is_some()
+    header_in(line, None, given, &File::default()).is_some()
 }
 
 /// Whether it is text of which some line has three cells or more, and no lines of objects.
@@ -83,12 +84,22 @@ fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
     names
 }
 
-/// Delimiter by which a line is a header. `file` is its name, and what is looked for in it.
+/// What is known of a file before its header.
+#[derive(Default)]
+struct File<'f> {
+    /// Its name, without the ending.
+    stem: &'f str,
+    /// What is looked for in it.
+    wanted: Wanted,
+    maker: Maker,
+}
+
+/// Delimiter by which a line is a header.
 fn header_in(
     line: &[u8],
     delimiter: Option<Delimiter>,
     given: Option<&Columns>,
-    file: (&str, Wanted),
+    file: &File<'_>,
 ) -> Option<Delimiter> {
     let tried = delimiter.as_slice();
     let tried = if tried.is_empty() {
@@ -103,11 +114,7 @@ fn header_in(
 }
 
 /// Whether these names are those of a table of rates or orientations; of one beside such a table, of forces or fields.
-fn names_something(
-    names: &[Name],
-    given: Option<&Columns>,
-    (stem, wanted): (&str, Wanted),
-) -> bool {
+fn names_something(names: &[Name], given: Option<&Columns>, file: &File<'_>) -> bool {
     let given = given.map(Columns::all).unwrap_or_default();
     let columns = || given.iter().flat_map(|given| &given.columns);
     // Numbers alone tell no header.
@@ -121,15 +128,16 @@ fn names_something(
             Role::Of(Kind::Gyro | Kind::Turn | Kind::Orientation)
         ) && !given.columns.is_empty()
     });
-    let kinds: &[Kind] = match wanted {
+    let kinds: &[Kind] = match file.wanted {
         Wanted::Rates => &[Kind::Gyro, Kind::Turn, Kind::Orientation, Kind::Matrix],
         Wanted::Forces | Wanted::Fields => &[Kind::Accel, Kind::Mag],
     };
     are_there
         && (is_given
+            || roles::axes_of_maker(names, file.maker, Kind::Gyro).is_some()
             || kinds.iter().any(|kind| {
                 !roles::candidates(names, *kind).is_empty()
-                    || roles::bare_axes(names, stem, *kind).is_some()
+                    || roles::bare_axes(names, file.stem, *kind).is_some()
             }))
 }
 
@@ -226,8 +234,13 @@ impl Opening {
         if self.given.is_none() && self.delimiter.is_none() && Table::is_own_header(line) {
             return Some(found(at, Delimiter::Byte(b','), true, true));
         }
-        let file = (self.stem.as_str(), self.wanted);
-        let named = header_in(line, self.delimiter, self.given.as_ref(), file);
+        let first = self.lines.first().map(Vec::as_slice);
+        let file = File {
+            stem: &self.stem,
+            wanted: self.wanted,
+            maker: Preamble::of(first.into_iter()).maker,
+        };
+        let named = header_in(line, self.delimiter, self.given.as_ref(), &file);
         if let Some(delimiter) = named {
             return Some(found(at, delimiter, true, false));
         }
@@ -500,7 +513,12 @@ impl Name {
         match &self.meant {
             Meant::Part { kind, .. } => kind.quantity(),
             Meant::Stamp | Meant::Step => Some(Quantity::Time),
-            Meant::Aside { .. } | Meant::Counter | Meant::Nothing => None,
+            Meant::Aside { .. }
+            | Meant::Clock
+            | Meant::Date
+            | Meant::Counter
+            | Meant::Sensor { .. }
+            | Meant::Nothing => None,
         }
     }
 
@@ -531,3 +549,7 @@ fn columns(names: &[Name], of: &[(usize, Column)]) -> Vec<(Option<Column>, Strin
     each.map(|(at, name)| (column(at).map(|(_, column)| *column), name.text.clone()))
         .collect()
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::indexing_slicing)]
+mod tests;

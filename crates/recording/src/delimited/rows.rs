@@ -70,6 +70,8 @@ pub struct Table {
     pub(super) has_decimal_comma: bool,
     pub(super) clock: Clock,
     pub(super) scales: Scales,
+    /// The sensor whose samples are named as those of a table of one.
+    pub(super) usual_sensor: Option<String>,
     /// Interval of its increments, ns.
     pub(super) interval: Option<i64>,
     /// Meaning of its numbers that its names declare.
@@ -154,6 +156,7 @@ impl Table {
             has_decimal_comma: false,
             clock: Clock::Nothing,
             scales: Scales::default(),
+            usual_sensor: None,
             interval: None,
             declared: Declared::default(),
             assumed: String::new(),
@@ -354,7 +357,8 @@ impl Table {
 
     fn line(&self, read: Read, out: &mut Vec<RawSample>) -> Result<Line, Undecodable> {
         // Before the sample: a row that is refused leaves none.
-        let id = read.id.as_deref().map(exact_name).transpose()?;
+        let id = read.id.as_deref().filter(|id| !self.is_usual(id, &read));
+        let id = id.map(exact_name).transpose()?;
         let scaled = |vector: Option<[f64; 3]>, by: f64| match by {
             1.0 => vector,
             _ => vector.map(|v| v.map(|value| value * by)),
@@ -368,7 +372,8 @@ impl Table {
         let orientation = self
             .whole(read.orientation, Column::Orientation)?
             .or_else(|| matrix.map(|rows| quaternion(&rows)));
-        let stamp = read.stamp.or_else(|| self.clock.of_row(self.row));
+        let stamp = self.clock.instant(read.stamp, read.day);
+        let stamp = stamp.or_else(|| self.clock.of_row(self.row));
         let log = read.log.or(stamp).unwrap_or_default();
         // In tables of several sensors each has rows of its own.
         let is_others = self.whose == Whose::Others
@@ -402,6 +407,15 @@ impl Table {
         };
         line.decoded.samples = 1;
         Ok(line)
+    }
+
+    /// Whether a row is of the sensor of all first rows, or has no rate, where that tells the kind of a row.
+    fn is_usual(&self, id: &str, read: &Read) -> bool {
+        let Some(usual) = &self.usual_sensor else {
+            return false;
+        };
+        let has_rate = read.gyro.iter().chain(&read.turn).any(Option::is_some);
+        usual == id || !has_rate
     }
 
     /// A vector of which all cells are filled, or none.
@@ -461,6 +475,7 @@ fn rotation_vector(wxyz: [f64; 4]) -> [f64; 3] {
 #[derive(Default)]
 struct Read {
     stamp: Option<Nanos>,
+    day: Option<Nanos>,
     log: Option<Nanos>,
     interval: Option<i64>,
     kind: Option<SampleKind>,
@@ -502,13 +517,21 @@ impl Read {
         match column {
             Column::Stamp if is_absent(text) => {}
             Column::Stamp => self.stamp = Some(clock.read(text)?),
+            Column::Date if is_absent(text) => {}
+            Column::Date => self.day = Some(clock.day(text)?),
             Column::Log => self.log = Some(Nanos(whole()?)),
             Column::Interval => self.interval = Some(whole()?),
             Column::Kind => {
                 let kind = SampleKind::named(text);
                 self.kind = Some(kind.ok_or("is none of rate, average, delta-angle, rotation")?);
             }
-            Column::Id => self.id = Some(text.to_owned()),
+            // Where several columns name it, by all of them.
+            Column::Id => {
+                self.id = Some(match self.id.take() {
+                    Some(before) => format!("{before}/{text}"),
+                    None => text.to_owned(),
+                });
+            }
             Column::Gyro(axis) => put(self.gyro.get_mut(axis))?,
             Column::Accel(axis) => put(self.accel.get_mut(axis))?,
             Column::Mag(axis) => put(self.mag.get_mut(axis))?,

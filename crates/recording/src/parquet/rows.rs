@@ -171,7 +171,11 @@ impl<S: Read + Seek> Rows<S> {
                         || is_given(n, &said)
                 }
             };
-            let may_be_text = footer.is_own || name.meant == Meant::Stamp;
+            let may_be_text = footer.is_own
+                || matches!(
+                    name.meant,
+                    Meant::Stamp | Meant::Clock | Meant::Date | Meant::Sensor { .. }
+                );
             let is_read = is_wanted && is_readable(leaf, may_be_text);
             self.read.push(is_read.then(|| leaf.clone()));
             if n > 0 {

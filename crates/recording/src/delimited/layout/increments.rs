@@ -52,6 +52,7 @@ impl Roles<'_> {
             sum: 0,
         };
         Ok(Some(Instants {
+            date: None,
             clock,
             column: Some((at, format!("dt={}:{unit}", self.reference(at)))),
             notes: vec![format!(

@@ -4,6 +4,7 @@
 //! that which its size suggests. Where name and steps contradict each other, neither is believed.
 
 use super::super::clock::{Clock, Wraps};
+use super::super::time_of_day::{Daily, DateOrder, date_and_time, since_midnight};
 use super::is_number;
 use super::roles::{Roles, place};
 use crate::columns::Meant;
@@ -19,6 +20,8 @@ pub(super) struct Instants {
     pub(super) clock: Clock,
     /// The column that says it, and what `--columns` calls it.
     pub(super) column: Option<(usize, String)>,
+    /// The column of its days.
+    pub(super) date: Option<usize>,
     pub(super) notes: Vec<String>,
 }
 
@@ -30,6 +33,8 @@ struct Stamp {
     /// Whole nanoseconds.
     is_exact: bool,
     note: Option<String>,
+    /// The column of its days.
+    date: Option<usize>,
 }
 
 /// Steps by which the two kinds of `SampleTimeFine` are told apart: of 10 Hz and more in 0.1 ms, of 200 Hz and less
@@ -72,9 +77,10 @@ impl Roles<'_> {
         }
         match columns.as_slice() {
             _ if is_counted => self.counted(),
-            [] => match self.stepped()? {
-                Some(stepped) => Ok(stepped),
-                None => self.counted(),
+            [] => match (self.stepped()?, self.time_of_day()) {
+                (Some(stepped), _) => Ok(stepped),
+                (None, Some(stamp)) => Ok(self.of_stamp(stamp)),
+                (None, None) => self.counted(),
             },
             [one] => Ok(self.of_stamp(self.stamp(*one, None)?)),
             several => {
@@ -105,6 +111,7 @@ impl Roles<'_> {
         Instants {
             clock: stamp.clock,
             column: Some((stamp.at, said)),
+            date: stamp.date,
             notes: stamp.note.into_iter().collect(),
         }
     }
@@ -127,6 +134,7 @@ impl Roles<'_> {
             return Ok(Instants {
                 clock: Clock::Nothing,
                 column: None,
+                date: None,
                 notes: vec![format!(
                     "no column says when it was measured, and its head no rate: {TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT"
                 )],
@@ -143,6 +151,7 @@ impl Roles<'_> {
         Ok(Instants {
             clock,
             column: column.map(|at| (at, format!("counter={}", self.reference(at)))),
+            date: None,
             notes: vec![format!(
                 "stamps are {by} at {} Hz, as its head says: `{}`",
                 rate.hz, rate.said
@@ -168,6 +177,7 @@ impl Roles<'_> {
             unit: Some(Unit::Time(nanos)),
             is_exact: nanos == 1.0 && numbers.iter().all(|n| n.parse::<i64>().is_ok()),
             note: None,
+            date: None,
         };
         let is_fine = text.eq_ignore_ascii_case("sampletimefine");
         let wrapping = |nanos: f64| Stamp {
@@ -188,11 +198,14 @@ impl Roles<'_> {
                     ..of(1.0)
                 });
             }
+            if let Some(stamp) = self.daily(at) {
+                return Ok(stamp);
+            }
             // One that is none among others is counted with its row.
             if numbers.iter().all(|n| !is_number(n)) {
                 return Err(
                     Diagnostic::new(format!(
-                        "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339)",
+                        "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339, times of day)",
                         crate::text::snippet(odd.as_bytes())
                     ))
                     .help(format!(
@@ -227,6 +240,77 @@ impl Roles<'_> {
                 Ok(Stamp { note, ..of(nanos) })
             }
         }
+    }
+
+    /// A column that is a time of day by its name, where it is.
+    fn time_of_day(&self) -> Option<Stamp> {
+        let each = self.names.iter().enumerate();
+        let mut times = each
+            .filter(|(_, name)| name.meant == Meant::Clock)
+            .filter_map(|(at, _)| self.daily(at));
+        times.next()
+    }
+
+    /// The cells of a column in the first rows, as they are.
+    fn texts(&self, at: usize) -> Vec<&str> {
+        let cells = self.rows.iter().filter_map(|row| row.get(at));
+        cells
+            .map(String::as_str)
+            .filter(|cell| !cell.is_empty() && *cell != "-")
+            .collect()
+    }
+
+    /// A column of times of day, with their dates in the same cells, in another column, or nowhere.
+    fn daily(&self, at: usize) -> Option<Stamp> {
+        let cells = self.texts(at);
+        let stamp = |daily: Daily, date: Option<usize>, note: Option<String>| Stamp {
+            at,
+            clock: Clock::Daily(daily),
+            unit: None,
+            is_exact: false,
+            note,
+            date,
+        };
+        let unsure = |said: &str| {
+            format!(
+                "whether the month or the day is first in `{}` does not show: it is taken for the month, and days go on at midnight",
+                crate::text::snippet(said.as_bytes())
+            )
+        };
+        let split: Option<Vec<(&str, &str)>> = cells.iter().map(|c| date_and_time(c)).collect();
+        if let Some(pairs) = split.filter(|pairs| !pairs.is_empty())
+            && let Some((order, is_sure)) = DateOrder::of(pairs.iter().map(|(date, _)| *date))
+            && pairs.iter().all(|(_, time)| since_midnight(time).is_some())
+        {
+            let (first, _) = pairs.first()?;
+            return Some(match is_sure {
+                true => stamp(Daily::with_date_in_cell(order), None, None),
+                false => stamp(
+                    Daily::counted(order.midnight(first)),
+                    None,
+                    Some(unsure(first)),
+                ),
+            });
+        }
+        if cells.is_empty() || !cells.iter().all(|cell| since_midnight(cell).is_some()) {
+            return None;
+        }
+        let each = self.names.iter().enumerate();
+        let mut dates = each.filter(|(_, name)| name.meant == Meant::Date);
+        let dated = dates.find_map(|(at, _)| {
+            let cells = self.texts(at);
+            let (order, is_sure) = DateOrder::of(cells.iter().copied())?;
+            Some((at, order, is_sure, *cells.first()?))
+        });
+        Some(match dated {
+            Some((date, order, true, _)) => stamp(Daily::with_date_beside(order), Some(date), None),
+            Some((_, order, false, first)) => stamp(
+                Daily::counted(order.midnight(first)),
+                None,
+                Some(unsure(first)),
+            ),
+            None => stamp(Daily::counted(None), None, None),
+        })
     }
 
     /// Nanoseconds of a count in a column that states no unit, and what is to be said of the guess.

@@ -13,6 +13,7 @@ use crate::decode::Wanted;
 use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::record::{AccelUnit, SampleKind};
 use strapd_attitude::setting::{BODY, COLUMNS};
 
@@ -128,6 +129,13 @@ pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<us
     ["x", "y", "z"].into_iter().map(axis).collect()
 }
 
+/// The rates of a `.gcsv`, which only its first line tells: elsewhere `rx` is an angle as well.
+pub(super) fn axes_of_maker(names: &[Name], maker: Maker, kind: Kind) -> Option<Vec<usize>> {
+    let is_it = maker == Maker::Gyroflow && kind == Kind::Gyro;
+    let axis = |axis: &str| place(names, axis).ok();
+    is_it.then(|| ["rx", "ry", "rz"].into_iter().map(axis).collect())?
+}
+
 /// Role of a table: its columns, its kind, and what a column of it is by its part.
 type Filling<'c> = (Option<&'c Chosen>, Kind, fn(usize) -> Column);
 
@@ -226,16 +234,30 @@ impl Roles<'_> {
             turn,
             push,
         };
-        let (of, assumed) = self.placed(&fillings, &instants)?;
+        let whose = self.whose(fillings.gyro.as_ref().or(fillings.turn.as_ref()))?;
+        let (mut of, mut assumed) = self.placed(&fillings, &instants)?;
+        let is_free = |at: &usize| of.iter().all(|(taken, _)| taken != at);
+        let date = instants.date.filter(is_free).map(|at| (at, Column::Date));
+        of.extend(date);
+        let free = |(at, _): &(usize, Column)| of.iter().all(|(taken, _)| taken != at);
+        let sensors: Vec<(usize, Column)> = whose.placed().filter(free).collect();
+        of.extend(sensors);
+        assumed.extend(whose.said);
         let mut table = Table::of_columns(header, columns(self.names, &of), delimiter);
         table.clock = instants.clock;
+        table.usual_sensor = whose.usual;
         notes.extend(instants.notes);
         table.has_decimal_comma = self.has_decimal_comma(&of);
         fillings.declare_units(&mut table, period);
         if let Some(axes) = &self.preamble.orientation {
-            notes.push(format!(
-                "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
-            ));
+            notes.push(match axes.parse::<BodyAxes>() {
+                Ok(_) => format!(
+                    "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
+                ),
+                Err(why) => format!(
+                    "its head says orientation,{axes}, which no body has ({why}): axes are as recorded"
+                ),
+            });
         }
         table.assumed = assumed.join(",");
         table.notes = notes;
@@ -319,6 +341,13 @@ impl Roles<'_> {
         }
         if groups.is_empty() && (kind == Kind::Gyro || self.wanted != Wanted::Rates) {
             groups.extend(bare_axes(self.names, self.stem, kind).map(|columns| Group {
+                columns,
+                twice: None,
+            }));
+        }
+        if groups.is_empty() {
+            let columns = axes_of_maker(self.names, self.preamble.maker, kind);
+            groups.extend(columns.map(|columns| Group {
                 columns,
                 twice: None,
             }));

@@ -1,0 +1,146 @@
+//! Tables by their first rows: whose each row is, and when it was measured.
+
+use super::*;
+use strapd_attitude::record::Nanos;
+
+/// Sensor and stamp of each row, and what its reader is told.
+fn rows(text: &str, columns: Option<&str>) -> (Vec<(Option<String>, Option<i64>)>, String) {
+    let options = Options {
+        columns: columns.map(|columns| columns.parse().unwrap()),
+        ..Options::default()
+    };
+    let mut opening = Opening::new(&options, "log");
+    for line in text.lines() {
+        if !opening.take(line.as_bytes()) {
+            break;
+        }
+    }
+    let (mut table, held) = opening.finish().unwrap();
+    let before = held.last().map_or(0, |held| held.number as usize);
+    let mut found = Vec::new();
+    let all = held.iter().map(|held| held.line.as_slice());
+    for line in all.chain(text.lines().skip(before).map(str::as_bytes)) {
+        let mut samples = Vec::new();
+        let line = table.decode(line, &mut samples).unwrap();
+        let stamp = samples.first().and_then(|sample| sample.header);
+        found.push((line.id, stamp.map(|Nanos(nanos)| nanos)));
+    }
+    (found, table.notes().join("; "))
+}
+
+fn ids(text: &str, columns: Option<&str>) -> Vec<String> {
+    let (rows, _) = rows(text, columns);
+    rows.into_iter()
+        .map(|(id, _)| id.unwrap_or_default())
+        .collect()
+}
+
+fn table(head: &str, count: usize, cell: impl Fn(usize) -> String) -> String {
+    let mut text = format!("time,{head},gyro_x,gyro_y,gyro_z\n");
+    for n in 0..count {
+        text.push_str(&format!("{}.02,{},0.1,0.2,0.3\n", n, cell(n)));
+    }
+    text
+}
+
+#[test]
+fn a_column_that_names_the_sensor_keeps_bodies_apart() {
+    let two = |n: usize| ["left", "right"][n % 2].to_owned();
+    for head in ["device", "sensor", "imu_id", "MAC", "id", "Device ID"] {
+        let found = ids(&table(head, 60, two), None);
+        assert_eq!(found[..3], ["left", "right", "left"], "{head}");
+        assert_eq!(found[59], "right", "{head}");
+    }
+    let numbers = ids(&table("id", 60, |n| (n % 3).to_string()), None);
+    assert_eq!(numbers[..4], ["0", "1", "2", "0"]);
+    let both = ids(
+        &table("device,instance", 60, |n| format!("hub,{}", n % 2)),
+        None,
+    );
+    assert_eq!(both[..2], ["hub/0", "hub/1"]);
+    // One that comes when the first rows have long been read, and the name of those before it.
+    let late = ids(
+        &table("device", 60, |n| ["left", "right"][n / 50].to_owned()),
+        None,
+    );
+    assert_eq!((late[0].as_str(), late[55].as_str()), ("", "right"));
+}
+
+#[test]
+fn a_running_number_and_a_measurement_name_no_sensor() {
+    let one = vec![String::new(); 60];
+    let cases: [(&str, fn(usize) -> String); 7] = [
+        ("id", |n| n.to_string()),
+        ("id", |n| (n / 10).to_string()),
+        ("device", |n| n.to_string()),
+        ("sensor", |n| format!("0.{}", n % 3)),
+        ("device", |_| "left".to_owned()),
+        ("device", |_| String::new()),
+        ("mode", |n| ["a", "b"][n % 2].to_owned()),
+    ];
+    for (head, cell) in cases {
+        assert_eq!(ids(&table(head, 60, cell), None), one, "{head}");
+    }
+}
+
+#[test]
+fn the_sensor_is_the_column_that_is_given_or_none() {
+    let two = table("mode", 40, |n| ["a", "b"][n % 2].to_owned());
+    assert_eq!(ids(&two, Some("sensor=mode"))[..2], ["a", "b"]);
+    let two = table("device", 40, |n| ["a", "b"][n % 2].to_owned());
+    assert_eq!(ids(&two, Some("sensor=none"))[..2], ["", ""]);
+}
+
+/// Milliseconds since the first row, of rows with these cells of time.
+fn millis(head: &str, cells: &[&str]) -> (Vec<i64>, String) {
+    let mut text = format!("{head},gyro_x,gyro_y,gyro_z\n");
+    for cell in cells {
+        text.push_str(&format!("{cell},0.1,0.2,0.3\n"));
+    }
+    let (rows, notes) = rows(&text, None);
+    let stamps: Vec<i64> = rows.into_iter().filter_map(|(_, stamp)| stamp).collect();
+    let since = |stamp: &i64| (stamp - stamps[0]) / 1_000_000;
+    (stamps.iter().map(since).collect(), notes)
+}
+
+#[test]
+fn times_of_day_are_stamps_and_go_on_at_midnight() {
+    let times = ["23:59:59.50", "23:59:59.75", "00:00:00.00", "00:00:00.25"];
+    assert_eq!(millis("time", &times).0, [0, 250, 500, 750]);
+    assert_eq!(millis("rtcTime", &times).0, [0, 250, 500, 750]);
+    let dated = [
+        "03/30/2025,23:59:59.50",
+        "03/30/2025,23:59:59.75",
+        "03/31/2025,00:00:00.00",
+        "03/31/2025,00:00:00.25",
+    ];
+    let (found, notes) = millis("rtcDate,rtcTime", &dated);
+    assert_eq!((found, notes.as_str()), (vec![0, 250, 500, 750], ""));
+    // A night lies between them, which the date alone tells.
+    let days = ["2025-03-30,10:00:00", "2025-03-31,10:00:00"];
+    assert_eq!(millis("Date,Time", &days).0, [0, 86_400_000]);
+    let (found, notes) = millis("date,time", &["03/04/2025,23:59:59", "03/05/2025,00:00:00"]);
+    assert_eq!(found, [0, 1000]);
+    assert!(notes.contains("03/04/2025"), "{notes}");
+    let one_cell = ["30.03.2025 23:59:59.5", "31.03.2025 00:00:00.5"];
+    assert_eq!(millis("time", &one_cell).0, [0, 1000]);
+}
+
+#[test]
+fn rates_of_a_gcsv_are_known_by_its_first_line_alone() {
+    let rows = "t,rx,ry,rz,ax,ay,az\n0,1,2,3,0,0,4096\n1,1,2,3,0,0,4096\n";
+    let head = "GYROFLOW IMU LOG\nversion,1.1\norientation,XYZ\ntscale,0.001\ngscale,0.0005\n";
+    let opened = |text: &str| {
+        let mut opening = Opening::new(&Options::default(), "in");
+        for line in text.lines() {
+            opening.take(line.as_bytes());
+        }
+        opening.finish()
+    };
+    let (mut table, held) = opened(&format!("{head}{rows}")).unwrap();
+    let mut samples = Vec::new();
+    table.decode(&held[0].line, &mut samples).unwrap();
+    let gyro = samples.first().and_then(|sample| sample.gyro);
+    assert_eq!(gyro, Some([0.0005, 0.001, 0.0015]));
+    assert!(opened(rows).is_err(), "angles, elsewhere");
+}
