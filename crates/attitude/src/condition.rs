@@ -6,9 +6,9 @@
 //! strictly, and no interval crosses a place where time is unknown.
 //!
 //! ```text
-//! RawSample -> gate (one sample alone) -> order (in time) -> timing (interval, join) -> RateSample
+//! RawSample -> gate (one sample alone) -> order (in time) -> spikes -> timing (interval, join) -> RateSample
 //! RateSample -> stillness (rests: bias, level)         RawSample -> quality (what `info` prints)
-//! RawSample -> truncation (did the driver cut?)
+//! RawSample -> truncation (did the driver cut?), rails (was an axis clipped?)
 //! ```
 //!
 //! # Policy
@@ -31,6 +31,7 @@
 //! | stamped when a batch came (recordings) | spread evenly, at the rate of the batches | `Accepted` |
 //! | step above 1.5 times the ordinary | bridged up to `max_gap_secs`, beyond it `on_gap` | `Accepted` |
 //! | ... but the stamps catch up | a late stamp, not a gap | `Accepted` |
+//! | one to three rates far off the line between their neighbours (recordings) | replaced by that line, `REPAIRED` | `Accepted` |
 //!
 //! The ordinary step is learnt from the stream. An increment whose predecessor is missing covers its own
 //! interval only, so `start` is later than the stamp before, and the propagator fills the hole.
@@ -43,9 +44,11 @@ mod gate;
 mod histogram;
 mod memory;
 mod order;
+pub(crate) mod rails;
 mod report;
 mod settings;
 mod spacing;
+mod spikes;
 mod timing;
 
 pub mod quality;
@@ -63,11 +66,13 @@ pub use memory::Memory;
 pub use report::{ClockSet, FirstBad, GAPS_KEPT, Gap, Gaps, Report, Wraps};
 pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};
 pub use settings::{OnGap, Settings, SettingsError, StampRepair};
+pub use spikes::{SpikeCount, SpikePolicy};
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
 use clock::{BatchLine, ClockSteps, IndexClock, Turns};
 use gate::{Gate, MAX_STAMP};
 use order::Order;
+use spikes::Spikes;
 use timing::Timing;
 
 /// Entries from which the ordinary step is learnt before the first sample leaves (recordings).
@@ -86,6 +91,8 @@ pub struct Conditioner {
     index_clock: Option<IndexClock>,
     gate: Gate,
     order: Order,
+    /// `None` where spikes are left, and where no sample waits for its successors.
+    spikes: Option<Spikes>,
     timing: Timing,
     window: usize,
     /// Entries held back just now: the window, or more until the ordinary step is known.
@@ -149,6 +156,7 @@ impl Conditioner {
             },
             gate: Gate::new(settings),
             order: Order::new(window, max_gap_nanos, batch_line.is_some()),
+            spikes: Spikes::of(settings),
             timing,
             window,
             hold: match (window, settings.kind) {
@@ -364,6 +372,11 @@ impl Conditioner {
                 return;
             }
             let (stamp, epoch) = (entry.stamp, entry.epoch);
+            let repaired = self.spikes.as_mut().and_then(|spikes| {
+                let steps = (self.timing.spacing(), self.timing.coarse());
+                spikes.repaired(entry, ahead, steps, &mut self.report.spikes)
+            });
+            let entry = repaired.as_ref().unwrap_or(entry);
             out.push(self.timing.one(entry, stamp, ahead, &mut self.report));
             match timing::verdict(entry.status) {
                 Verdict::Accepted => self.report.counts.add(Verdict::Accepted),
@@ -416,7 +429,12 @@ impl Conditioner {
                     .note(Verdict::DuplicateStamp, entry.index, Some(entry.stamp));
                 continue;
             };
-            let mut entry = *entry;
+            let following = rest.get(i + 1..).unwrap_or_default();
+            let repaired = self.spikes.as_mut().and_then(|spikes| {
+                let steps = (self.timing.spacing(), self.timing.coarse());
+                spikes.repaired(entry, following, steps, &mut self.report.spikes)
+            });
+            let mut entry = repaired.unwrap_or(*entry);
             if placement.moves(at) {
                 entry.status = entry.status.with(Status::RESTAMPED);
             }

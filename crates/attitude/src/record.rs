@@ -276,6 +276,8 @@ impl Status {
     pub const REST: Status = Status(1 << 12);
     /// The tilt was too wrong to be corrected, and was set anew at this sample.
     pub const LEVELLED: Status = Status(1 << 13);
+    /// A spike of the gyro stood here: the rate is the line between its neighbours.
+    pub const REPAIRED: Status = Status(1 << 14);
 
     /// Both sets of bits.
     #[must_use]
@@ -291,7 +293,7 @@ impl Status {
 
     /// The names of the bits that are set, in a fixed order; empty means `ok`.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        const NAMES: [(Status, &str); 14] = [
+        const NAMES: [(Status, &str); 15] = [
             (Status::BRIDGED, "bridged"),
             (Status::HELD, "held"),
             (Status::RESET, "reset"),
@@ -306,6 +308,7 @@ impl Status {
             (Status::AIDED, "aided"),
             (Status::REST, "rest"),
             (Status::LEVELLED, "levelled"),
+            (Status::REPAIRED, "repaired"),
         ];
         NAMES
             .into_iter()

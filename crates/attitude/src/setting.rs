@@ -185,6 +185,7 @@ settings! {
     SENSOR_DELAY = "sensor_delay";
     SHARD = "shard";
     SMOOTH = "smooth";
+    SPIKES = "spikes";
     STAMPS = "stamps";
     START = "start";
     START_STAMP = "start_stamp";

@@ -33,6 +33,7 @@ STATUS_BITS = {
     "aided": 1 << 11,
     "rest": 1 << 12,
     "levelled": 1 << 13,
+    "repaired": 1 << 14,
 }
 
 

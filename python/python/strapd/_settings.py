@@ -45,6 +45,7 @@ class Settings(TypedDict, total=False):
     earth_rate: Optional[float]
     regularise_stamps: Optional[bool]
     gyro_range: Optional[float]
+    spikes: Optional[Literal["repair", "keep"]]
     noise: Union[str, dict[str, Any], None]
     start: Optional[float]
     until: Optional[float]
@@ -85,6 +86,7 @@ SETTINGS = frozenset(
         "earth_rate",
         "regularise_stamps",
         "gyro_range",
+        "spikes",
         "noise",
         "start",
         "until",

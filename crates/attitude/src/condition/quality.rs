@@ -6,11 +6,13 @@
 mod gravity;
 mod summary;
 
+pub use super::rails::Clipped;
 pub use gravity::GyroAgainstGravity;
 pub use summary::{AxisStats, GravityAxis, OffsetStats, SpacingStats};
 
 use super::clock::{Clock, Turns};
 use super::histogram::Histogram;
+use super::rails::Rails;
 use super::regularise::{Lines, Uneven};
 use super::report::Wraps;
 use crate::record::{Nanos, RawSample};
@@ -81,6 +83,8 @@ pub struct QualitySummary {
     pub repeated_rows: u64,
     /// x, y, z.
     pub axes: [AxisStats; 3],
+    /// End of the range at which each was clipped, where its unit is rad/s, and where it is deg/s.
+    pub clipped: [[Option<Clipped>; 3]; 2],
     /// Samples with an acceleration.
     pub with_accel: u64,
     /// Number of these with NaN or infinity.
@@ -131,6 +135,7 @@ pub struct Quality {
     hole: Option<(Nanos, Nanos, u64)>,
     last_row_lone_zero: bool,
     axes: [Axis; 3],
+    rails: Rails,
     previous: Option<[f64; 3]>,
     first_orientation: Option<[f64; 4]>,
     offset: Offset,
@@ -177,6 +182,7 @@ impl Quality {
             hole: None,
             last_row_lone_zero: false,
             axes: [Axis::EMPTY; 3],
+            rails: Rails::new(),
             previous: None,
             first_orientation: None,
             offset: Offset::default(),
@@ -334,8 +340,9 @@ impl Quality {
         self.so_far.fast_rows +=
             u64::from((DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
         for (axis, v) in self.axes.iter_mut().zip(gyro) {
-            axis.push(v, held);
+            axis.push(v);
         }
+        self.rails.push(&gyro);
         Some(gyro)
     }
 

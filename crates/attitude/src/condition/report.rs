@@ -4,6 +4,7 @@
 //! bounded memory, with the first case of each kind kept so that a message can point at it.
 
 use super::clock::Period;
+use super::spikes::SpikeCount;
 use crate::record::{Counts, Join, Nanos, Verdict};
 
 /// Number of gaps kept one by one; all are counted.
@@ -126,6 +127,8 @@ pub struct Report {
     pub saturated: u64,
     /// Samples with a good gyro whose acceleration was not finite and was left out.
     pub accel_dropped: u64,
+    /// Spikes that were repaired.
+    pub spikes: SpikeCount,
     /// The ordinary spacing, nanoseconds; `None` until two samples were used.
     pub spacing_nanos: Option<i64>,
     /// The step of the clock, nanoseconds, where it is coarser than the sensor's: its samples were spread

@@ -4,6 +4,7 @@
 //! before the first sample, and the hot path needs no checks.
 
 use super::clock::{BatchRate, Clock};
+use super::spikes::SpikePolicy;
 use crate::frames::{AxisMap, Body, Dcm, Sensor};
 use crate::quaternion::BodyRate;
 use crate::record::{GyroUnit, SampleKind};
@@ -79,6 +80,8 @@ pub struct Settings {
     pub bias: BodyRate,
     /// Full scale of the gyro in rad/s, sensor axes: components at or beyond it are flagged.
     pub gyro_range: Option<f64>,
+    /// Treatment of spikes, where samples wait for their successors.
+    pub spikes: SpikePolicy,
     /// Leave out samples earlier than this, seconds after the first stamp.
     pub start: Option<f64>,
     /// Leave out samples later than this, seconds after the first stamp.
@@ -135,6 +138,7 @@ impl Default for Settings {
             truncation_step: None,
             bias: BodyRate::ZERO,
             gyro_range: None,
+            spikes: SpikePolicy::Repair,
             start: None,
             until: None,
             reorder_window: Settings::REPLAY_WINDOW,
@@ -182,6 +186,8 @@ impl Settings {
             truncation_step,
             bias: BodyRate(bias),
             gyro_range,
+            // What is saved means the same either way.
+            spikes: _,
             start,
             until,
             reorder_window,

@@ -609,6 +609,7 @@ fn conditioning(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> conditi
         truncation_step: prepared.truncation_step,
         has_arrival: prepared.has_arrival,
         batches: prepared.batches,
+        gyro_range: prepared.gyro_range,
         ..settings
     }
 }

@@ -133,6 +133,7 @@ impl Meaning {
             on_gap: plan.on_gap,
             bias,
             gyro_range: plan.gyro_range,
+            spikes: plan.spikes,
             start: plan.start,
             until: plan.until,
             repair: plan.stamps,

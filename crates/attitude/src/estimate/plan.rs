@@ -4,7 +4,7 @@
 //! here, before the data are looked at.
 
 use super::sensor_calibration::SensorCalibration;
-use crate::condition::{self, Clock, GyroUnit, OnGap, StampRepair};
+use crate::condition::{self, Clock, GyroUnit, OnGap, SpikePolicy, StampRepair};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{AxisMap, Body, BodyAxes, Nav, Sensor};
 use crate::propagate::{self, Method, Propagator};
@@ -78,6 +78,9 @@ pub struct Plan {
     pub regularise_stamps: bool,
     /// Full scale of the gyro, rad/s: components at or beyond it are marked saturated. Default: `None`, unknown.
     pub gyro_range: Option<f64>,
+    /// Treatment of spikes of the gyro in a recording: one to three samples that nothing around them agrees with.
+    /// Default: [`SpikePolicy::Repair`].
+    pub spikes: SpikePolicy,
     /// Noise of the sensor: sigma of the attitude grows by it, and the filter expects it. Default: the class `consumer`.
     pub noise: Noise,
     /// Measurements that correct the attitude of the gyro: gravity holds the tilt, a magnetic field the heading. Default:
@@ -170,6 +173,7 @@ impl Default for Plan {
             stamps: StampRepair::Auto,
             regularise_stamps: false,
             gyro_range: None,
+            spikes: SpikePolicy::Repair,
             noise: Noise::by_data(),
             aid: Aid::None,
             smooth: false,

@@ -14,6 +14,7 @@ use super::intervals::Mismatch;
 use super::meaning::Meaning;
 use super::plan::{Aid, Bias, Initial, Noise, Plan, Truncation};
 use super::stamps::{StampPass, Stamps};
+use crate::condition::rails::{Clipped, Rails};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::condition::truncation::Grid;
 use crate::condition::{BatchRate, Clock, ClockWarning, choose_clock_as};
@@ -23,12 +24,14 @@ use crate::propagate::Method;
 use crate::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use crate::record::{Nanos, RawSample, SampleKind};
 use crate::setting::{
-    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT, REGULARISE_STAMPS,
-    UNDO_TRUNCATION,
+    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_RANGE, GYRO_UNIT, INIT,
+    REGULARISE_STAMPS, UNDO_TRUNCATION,
 };
 use crate::worlds::{self, Convention, World};
 use nalgebra::Vector3;
 
+/// Share of the level at which samples were clipped that counts as the range.
+const AT_RANGE: f64 = 0.999;
 /// Seconds of data in which rest is sought when the log cannot be read twice.
 const REST_SECS: f64 = 60.0;
 
@@ -68,6 +71,8 @@ pub struct Prepared {
     pub truncation_step: Option<f64>,
     /// The rate of samples that were stamped when their batch came.
     pub batches: Option<BatchRate>,
+    /// Full scale of the gyro, rad/s, that was stated or that its samples were clipped at.
+    pub gyro_range: Option<f64>,
     /// Things to know.
     pub warnings: Vec<Diagnostic>,
 }
@@ -94,6 +99,8 @@ pub struct Preparation {
     stamps: Option<StampPass>,
     /// Rates (rad/s, sensor axes), where it is to be seen whether they were cut.
     rates: Option<Vec<[f64; 3]>>,
+    /// Readings at the end of the range, where nobody states it.
+    rails: Option<Rails>,
     /// The first specific forces that came in messages of their own.
     beside: Vec<RawSample>,
     /// Stamps that may be those of batches.
@@ -122,6 +129,10 @@ impl Preparation {
                 && patience == Patience::WholeLog
                 && !matches!(resolved.kind, SampleKind::DeltaAngle | SampleKind::Rotation))
             .then(Vec::new),
+            rails: (plan.gyro_range.is_none()
+                && patience == Patience::WholeLog
+                && matches!(resolved.kind, SampleKind::Rate | SampleKind::Average))
+            .then(Rails::new),
             beside: Vec::new(),
             clocks: ClockPass::of(plan).filter(|_| patience == Patience::WholeLog),
             class: ClassPass::of(plan).filter(|_| patience == Patience::WholeLog),
@@ -159,6 +170,9 @@ impl Preparation {
             && rates.len() < MANY
         {
             rates.push(self.resolved.rates(gyro));
+        }
+        if let (Some(rails), Some(gyro)) = (&mut self.rails, raw.gyro) {
+            rails.push(&self.resolved.rates(gyro));
         }
         if let Some(class) = &mut self.class {
             class.take(raw);
@@ -232,6 +246,7 @@ impl Preparation {
             rest,
             stamps,
             rates,
+            rails,
             beside,
             forces_beside,
             clocks,
@@ -262,6 +277,10 @@ impl Preparation {
         let plan = Plan {
             has_forces_beside: plan.has_forces_beside
                 || (is_beside && looked_at.iter().all(|raw| raw.accel.is_none())),
+            ..plan
+        };
+        let plan = Plan {
+            gyro_range: plan.gyro_range.or_else(|| clipped_at(rails, &mut warnings)),
             ..plan
         };
         let is_bias_unsaid = plan.bias == Bias::Unsaid;
@@ -336,6 +355,7 @@ impl Preparation {
             noise: plan.noise.taken(),
             aiding,
             truncation_step,
+            gyro_range: plan.gyro_range,
             clock,
             bias,
             bias_sigma,
@@ -449,6 +469,7 @@ pub fn at_once(
         noise: plan.noise.taken(),
         aiding,
         truncation_step: decide_truncation(plan, None, &mut warnings)?,
+        gyro_range: plan.gyro_range,
         clock: plan.clock,
         bias,
         bias_sigma,
@@ -462,6 +483,18 @@ pub fn at_once(
         stamps,
         warnings,
     })
+}
+
+/// The range, rad/s, that the samples were clipped at, if they were, and the warning of it.
+fn clipped_at(rails: Option<Rails>, warnings: &mut Vec<Diagnostic>) -> Option<f64> {
+    let (axis, clipped) = rails?.range(1.0)?;
+    let name = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
+    let Clipped { level, samples } = clipped;
+    warnings.push(format!(
+        "gyro {name} stays at exactly {level:.4} rad/s, {samples} samples in all: that is taken for the end of its range, beyond which the rate is unknown; {GYRO_RANGE} RAD_S states another"
+    ).into());
+    // What a bias leaves of it is at the range, too.
+    Some(level.abs() * AT_RANGE)
 }
 
 /// Whether the plan asks for something only rest can tell.

@@ -10,8 +10,8 @@ use strapd_attitude::estimate::{Meaning, Plan};
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
-    AGAINST_RECORDED, GYRO_RANGE, GYRO_UNIT, MAX_GAP, ON_GAP, RATE_HZ, REGULARISE_STAMPS, START,
-    TIME, TOPIC, UNTIL,
+    AGAINST_RECORDED, GYRO_RANGE, GYRO_UNIT, MAX_GAP, ON_GAP, RATE_HZ, REGULARISE_STAMPS, SPIKES,
+    START, TIME, TOPIC, UNTIL,
 };
 
 /// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
@@ -117,6 +117,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         );
     }
     out.extend(saturated(noted.conditioning));
+    out.extend(spikes(noted.conditioning));
     if let Some(references) = noted.references.filter(|_| summary.against.is_empty()) {
         out.push(no_reference(references));
     }
@@ -305,6 +306,29 @@ fn saturated(report: &Report) -> Option<Finding> {
             format!("{n} samples reach the gyro's range ({GYRO_RANGE}): the true rate was higher"),
         )
         .with("count", n)
+    })
+}
+
+/// Readings of the gyro that nothing around them agrees with.
+fn spikes(report: &Report) -> Option<Finding> {
+    let found = report.spikes;
+    let at = found.first.zip(report.first);
+    let at = at.map_or(0.0, |(spike, first)| spike.secs_since(first));
+    let largest = significant(found.largest, 3);
+    (found.samples > 0).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "spikes",
+            format!(
+                "{} spikes of the gyro, up to {largest} rad/s, first {at:.3} s after the start: repaired",
+                found.samples
+            ),
+        )
+        .with("count", found.samples)
+        .with("largest_rad_s", found.largest)
+        .with("first_at_s", at)
+        .advise("each was replaced by the line between its neighbours; to leave them as recorded")
+        .help([SPIKES.to("keep")])
     })
 }
 

@@ -13,7 +13,7 @@ use super::{Finding, Severity, verdicts};
 use crate::inspection::Inspection;
 use crate::summary::significant;
 use serde_json::json;
-use strapd_attitude::condition::quality::AxisStats;
+use strapd_attitude::condition::quality::{AxisStats, Clipped};
 use strapd_attitude::record::Counts;
 use strapd_attitude::setting::{BIAS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG};
 
@@ -24,11 +24,6 @@ const BIAS_DEG_PER_H: f64 = 10.0;
 const REPEATED_SHARE: f64 = 0.003;
 /// Longer runs of one value are no repeats of a sensor with noise.
 const LONG_RUN: u64 = 20;
-/// Rates above this that stay this even are a saturation, not a rest, in rad/s or deg/s.
-const SATURATION_FLOOR: f64 = 1.0;
-const SATURATED_SAMPLES: u64 = 5;
-/// Turning over, a sampled sine stands at its largest value for two samples at most.
-const SATURATED_RUN: u64 = 3;
 /// A rest in rad/s is below this; in deg/s, a rest is below it times 57.
 const STILL_DEVIATION: f64 = 0.025;
 /// Longest credible run of one value from a moving, quantised sensor.
@@ -159,9 +154,12 @@ fn never_still(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     }
 }
 
-/// Axes that spend many samples at exactly their largest reading, or repeat one value for long while others move.
+/// Axes that stay at the end of their range, or repeat one value for long while others move.
 fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let axes = &seen.looked.quality.axes;
+    let [in_rad, in_degrees] = &seen.looked.quality.clipped;
+    let is_in_degrees = seen.unit > 1.0;
+    let clipped = if is_in_degrees { in_degrees } else { in_rad };
     // One that never reads anything else is not there, or not turned about.
     let moving = axes
         .iter()
@@ -169,15 +167,7 @@ fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         .filter(|(_, stats)| stats.min < stats.max);
     for (axis, stats) in moving {
         let name = axis_name(axis);
-        let at = match stats.max.abs() >= stats.min.abs() {
-            true => stats.max,
-            false => stats.min,
-        };
-        if at.abs() > SATURATION_FLOOR * seen.unit
-            && stats.at_peak >= SATURATED_SAMPLES
-            && stats.longest_at_peak >= SATURATED_RUN
-        {
-            let samples = stats.at_peak;
+        if let Some(Clipped { level: at, samples }) = clipped.get(axis).copied().flatten() {
             out.push(
                 Finding::new(
                     Severity::Error,

@@ -50,10 +50,6 @@ pub struct AxisStats {
     pub mean: f64,
     /// Root mean square.
     pub rms: f64,
-    /// Number of times the largest magnitude occurs.
-    pub at_peak: u64,
-    /// Longest run of samples at that magnitude while the other axes moved.
-    pub longest_at_peak: u64,
     /// Longest run of one and the same value.
     pub longest_run: u64,
 }
@@ -82,12 +78,6 @@ pub(super) struct Axis {
     sum: f64,
     sum_squares: f64,
     count: u64,
-    /// Samples at the largest magnitude so far, the longest run of them while the other axes moved,
-    /// and the run under way.
-    at_peak: u64,
-    longest_at_peak: u64,
-    run_at_peak: u64,
-    peak: f64,
     /// Samples in a row with this value, and the longest such run.
     run: u64,
     longest_run: u64,
@@ -101,39 +91,17 @@ impl Axis {
         sum: 0.0,
         sum_squares: 0.0,
         count: 0,
-        at_peak: 0,
-        longest_at_peak: 0,
-        run_at_peak: 0,
-        peak: 0.0,
         run: 0,
         longest_run: 0,
         last: f64::NAN,
     };
 
-    /// `held`: the whole row repeats the one before, so nothing moved.
-    pub(super) fn push(&mut self, v: f64, held: bool) {
+    pub(super) fn push(&mut self, v: f64) {
         self.min = self.min.min(v);
         self.max = self.max.max(v);
         self.sum += v;
         self.sum_squares += v * v;
         self.count += 1;
-        let size = v.abs();
-        if size > self.peak {
-            self.peak = size;
-            self.at_peak = 1;
-            self.run_at_peak = 1;
-            self.longest_at_peak = 1;
-        } else if size == self.peak {
-            self.at_peak += 1;
-            self.run_at_peak = match (v == self.last, held) {
-                (true, false) => self.run_at_peak + 1,
-                (true, true) => self.run_at_peak,
-                (false, _) => 1,
-            };
-            self.longest_at_peak = self.longest_at_peak.max(self.run_at_peak);
-        } else {
-            self.run_at_peak = 0;
-        }
         self.run = if v == self.last { self.run + 1 } else { 1 };
         self.longest_run = self.longest_run.max(self.run);
         self.last = v;
@@ -192,6 +160,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         longest_gap_secs: secs(quality.longest_gap),
         offset: offset(quality, duration_secs),
         axes: quality.axes.map(axis),
+        clipped: [1.0, 1.0_f64.to_degrees()].map(|rad| quality.rails.clipped(rad)),
         quietest_at: quietest.map(|q| q.start),
         quietest_deviation: quietest.map(|q| q.deviation),
         quietest_rate: quietest.map(|q| q.mean),
@@ -246,8 +215,6 @@ fn axis(axis: Axis) -> AxisStats {
         max: axis.max,
         mean: axis.sum / n,
         rms: (axis.sum_squares / n).sqrt(),
-        at_peak: axis.at_peak,
-        longest_at_peak: axis.longest_at_peak,
         longest_run: axis.longest_run,
     }
 }

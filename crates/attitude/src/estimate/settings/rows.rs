@@ -2,7 +2,7 @@
 
 use super::{Default, Row, Takes, Word};
 use crate::condition::{
-    Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES, StampRepair,
+    Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES, SpikePolicy, StampRepair,
 };
 use crate::diagnostic::Diagnostic;
 use crate::estimate::plan::{
@@ -45,7 +45,7 @@ const ROW: Row = Row {
 /// Every setting of an estimation.
 // A row is read as one; broken at 100 columns it is a page.
 #[rustfmt::skip]
-pub static ROWS: [Row; 35] = [
+pub static ROWS: [Row; 36] = [
     Row {
         setting: TIME,
         meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
@@ -439,6 +439,18 @@ pub static ROWS: [Row; 35] = [
         default: Default::Unset("unknown"),
         placeholder: "RAD_S",
         takes: number("rad/s", 0.0, f64::INFINITY, |p, range| p.gyro_range = Some(range)),
+        ..ROW
+    },
+    Row {
+        setting: SPIKES,
+        meaning: "Spikes of the gyro in a recording: one to three samples far off the line between their neighbours, which nothing else felt: repair (by that line), keep",
+        effect: "A spike that is integrated rotates the attitude for ever: one of 30 rad/s at 100 Hz by 17 degrees. Each that is repaired is counted and shown. A live stream and {method} commit wait for no later sample: there spikes are kept.",
+        default: Default::Value(SpikePolicy::Repair.name()),
+        placeholder: "SPIKES",
+        words: &[
+            word(SpikePolicy::Repair.name(), "Replace them by the line between their neighbours", |p| p.spikes = SpikePolicy::Repair),
+            word(SpikePolicy::Keep.name(), "Leave them as recorded", |p| p.spikes = SpikePolicy::Keep),
+        ],
         ..ROW
     },
     Row {

@@ -1,0 +1,236 @@
+//! Rates of one topic -> axes that were clipped. Pure.
+//!
+//! A stage of its own because two judge by it: `check` as recorded, and a replay before its first sample, which then
+//! treats the samples at that level as it does those at a stated range. An axis is clipped where it stays at exactly
+//! its largest reading while another axis moves, and jumps onto that level and off it; the smooth top of a coarsely
+//! quantised swing has jumps of one step. `docs/theory/spikes.md` has the numbers.
+
+/// Samples in a row at the largest reading, while another axis changes.
+const RUN: u64 = 4;
+/// Jumps onto and off the level, in the smallest steps of the axis.
+const STEPS: f64 = 4.0;
+/// Jumps that are kept of one side.
+const KEPT: usize = 32;
+/// Level, rad/s, above which a gyro can be clipped.
+const FLOOR: f64 = 1.0;
+
+/// End of a gyro's range that an axis was clipped at.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Clipped {
+    /// Reading, source's unit, with its sign.
+    pub level: f64,
+    /// Samples at it.
+    pub samples: u64,
+}
+
+/// One direction of one axis.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    sign: f64,
+    /// Largest reading so far, samples at it, the run of them under way, and the longest.
+    peak: f64,
+    samples: u64,
+    run: u64,
+    longest: u64,
+    /// The newest jumps onto and off that level.
+    jumps: [f64; KEPT],
+    count: usize,
+}
+
+/// Readings of one axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    sides: [Side; 2],
+    last: Option<f64>,
+    /// Smallest change so far.
+    quantum: f64,
+}
+
+/// Readings of three axes, in the unit of the source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rails {
+    axes: [Axis; 3],
+}
+
+impl Rails {
+    pub(crate) fn new() -> Rails {
+        let side = |sign| Side {
+            sign,
+            peak: f64::NEG_INFINITY,
+            samples: 0,
+            run: 0,
+            longest: 0,
+            jumps: [0.0; KEPT],
+            count: 0,
+        };
+        Rails {
+            axes: [Axis {
+                sides: [side(1.0), side(-1.0)],
+                last: None,
+                quantum: f64::INFINITY,
+            }; 3],
+        }
+    }
+
+    /// Takes the next rates; those that are not finite are passed over.
+    pub(crate) fn push(&mut self, gyro: &[f64; 3]) {
+        if gyro.iter().any(|rate| !rate.is_finite()) {
+            return;
+        }
+        let mut has_changed = [true; 3];
+        for (changed, (axis, rate)) in has_changed.iter_mut().zip(self.axes.iter().zip(gyro)) {
+            *changed = axis.last != Some(*rate);
+        }
+        let [x, y, z] = has_changed;
+        let others = [y || z, x || z, x || y];
+        for ((axis, rate), other) in self.axes.iter_mut().zip(gyro).zip(others) {
+            axis.push(*rate, other);
+        }
+    }
+
+    /// Ends of the range of each axis, where `rad` in the source's unit is one rad/s.
+    pub(crate) fn clipped(&self, rad: f64) -> [Option<Clipped>; 3] {
+        self.axes.map(|axis| axis.clipped(rad))
+    }
+
+    /// The least level that an axis was clipped at, with its axis.
+    pub(crate) fn range(&self, rad: f64) -> Option<(usize, Clipped)> {
+        let clipped = self.clipped(rad);
+        let found = clipped.iter().enumerate();
+        let found = found.filter_map(|(axis, clipped)| Some((axis, (*clipped)?)));
+        found.min_by(|(_, a), (_, b)| a.level.abs().total_cmp(&b.level.abs()))
+    }
+}
+
+impl Axis {
+    fn push(&mut self, rate: f64, other_changed: bool) {
+        if let Some(last) = self.last {
+            let change = (rate - last).abs();
+            if change > 0.0 {
+                self.quantum = self.quantum.min(change);
+            }
+        }
+        for side in &mut self.sides {
+            side.push(rate, self.last, other_changed);
+        }
+        self.last = Some(rate);
+    }
+
+    fn clipped(&self, rad: f64) -> Option<Clipped> {
+        let is_clipped = |side: &&Side| {
+            side.longest >= RUN
+                && side.peak > FLOOR * rad
+                && side.median_jump() > STEPS * self.quantum
+        };
+        let side = self.sides.iter().find(is_clipped)?;
+        Some(Clipped {
+            level: side.peak * side.sign,
+            samples: side.samples,
+        })
+    }
+}
+
+impl Side {
+    fn push(&mut self, rate: f64, last: Option<f64>, other_changed: bool) {
+        let reading = rate * self.sign;
+        let last = last.map(|last| last * self.sign);
+        if reading > self.peak {
+            self.peak = reading;
+            (self.samples, self.run, self.longest, self.count) = (1, 1, 1, 0);
+            if let Some(last) = last {
+                self.add_jump(reading - last);
+            }
+        } else if reading == self.peak {
+            self.samples += 1;
+            match last {
+                Some(last) if last == reading => self.run += u64::from(other_changed),
+                last => {
+                    self.run = 1;
+                    last.map(|last| self.add_jump(reading - last));
+                }
+            }
+            self.longest = self.longest.max(self.run);
+        } else {
+            if last == Some(self.peak) {
+                self.add_jump(self.peak - reading);
+            }
+            self.run = 0;
+        }
+    }
+
+    fn add_jump(&mut self, jump: f64) {
+        if let Some(slot) = self.jumps.get_mut(self.count % KEPT) {
+            *slot = jump;
+        }
+        self.count = self.count.saturating_add(1);
+    }
+
+    fn median_jump(&self) -> f64 {
+        let mut jumps = self.jumps;
+        let Some(jumps) = jumps.get_mut(..self.count.min(KEPT)) else {
+            return 0.0;
+        };
+        jumps.sort_unstable_by(f64::total_cmp);
+        let upper = jumps.get(jumps.len() / 2).copied().unwrap_or(0.0);
+        match jumps.len() % 2 {
+            0 => {
+                let lower = jumps.get((jumps.len() / 2).saturating_sub(1)).copied();
+                lower.map_or(upper, |lower| (lower + upper) / 2.0)
+            }
+            _ => upper,
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A swing of `size` about x at 100 Hz, as `read` reads it, while the other axes move.
+    fn swing(size: f64, read: impl Fn(f64) -> f64) -> Rails {
+        let mut rails = Rails::new();
+        for n in 0..4000 {
+            let t = f64::from(n) * 0.01;
+            rails.push(&[
+                read(size * (2.0 * t).sin()),
+                (1.3 * t).cos(),
+                0.2 * (0.7 * t).sin(),
+            ]);
+        }
+        rails
+    }
+
+    #[test]
+    fn an_axis_that_is_cut_off_is_clipped_at_its_level() {
+        let rails = swing(3.0, |rate| rate.clamp(-2.0, 2.0));
+        let [x, y, z] = rails.clipped(1.0);
+        assert_eq!(x.map(|clipped| clipped.level), Some(2.0));
+        assert!(x.unwrap().samples > 500);
+        assert_eq!((y, z), (None, None));
+        assert_eq!(rails.range(1.0).map(|(axis, _)| axis), Some(0));
+        // One side alone, and its sign.
+        let one_sided = swing(3.0, |rate| rate.max(-2.5)).clipped(1.0)[0];
+        assert_eq!(one_sided.map(|clipped| clipped.level), Some(-2.5));
+        // Of what is 2 deg/s, nothing is clipped.
+        assert_eq!(rails.clipped(57.3)[0], None);
+    }
+
+    #[test]
+    fn the_top_of_a_smooth_swing_is_no_end_of_the_range_however_coarse() {
+        for step in [1.0, 5.0, 1.0 / 16.4, 1e-9] {
+            let rails = swing(111.4, |rate| (rate / step).round() * step);
+            assert_eq!(rails.clipped(57.3), [None; 3], "{step}");
+        }
+    }
+
+    #[test]
+    fn samples_that_are_repeated_whole_are_no_run() {
+        let mut rails = Rails::new();
+        for n in 0..4000 {
+            let t = f64::from(n / 8) * 0.08;
+            rails.push(&[3.0 * (2.0 * t).sin(), (1.3 * t).cos(), 0.1]);
+        }
+        assert_eq!(rails.clipped(1.0), [None; 3]);
+    }
+}

@@ -1,0 +1,325 @@
+//! Entry with its neighbours -> the entry, or what stands in for a spike. Pure.
+//!
+//! A stage of its own because it is the only one that doubts a reading that is finite, plausible and in time: a bus
+//! glitch is a run of one to three samples far off the line between its neighbours, while these agree with each other,
+//! nothing shortly before was like it, and the accelerometer felt no blow. `docs/theory/spikes.md` derives the rule.
+//!
+//! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), it is off.
+
+use super::gate::{Entry, NO_ACCEL, finite_accel};
+use super::settings::Settings;
+use crate::record::{Nanos, SampleKind, Status};
+use nalgebra::Vector3;
+
+/// Treatment of spikes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+pub enum SpikePolicy {
+    /// Replace them by the line between their neighbours.
+    #[default]
+    Repair,
+    /// Leave them as recorded.
+    Keep,
+}
+
+impl SpikePolicy {
+    /// The name used by `--spikes`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            SpikePolicy::Repair => "repair",
+            SpikePolicy::Keep => "keep",
+        }
+    }
+}
+
+/// Spikes that were repaired.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct SpikeCount {
+    /// Samples repaired.
+    pub samples: u64,
+    /// Stamp of the first.
+    pub first: Option<Nanos>,
+    /// Farthest that one was off the line between its neighbours, rad/s.
+    pub largest: f64,
+}
+
+/// Longest run of samples that can be a spike.
+const LONGEST: usize = 3;
+/// Longest time that two or more samples of a spike take, ns: a longer pulse is motion.
+const LONGEST_NANOS: i64 = 12_000_000;
+/// Longest step, ns, at which one sample alone can be a spike: at a longer one a flick of the hand is one sample.
+const LONGEST_STEP_NANOS: i64 = 25_000_000;
+/// Steps that a run and its neighbours may take, in times of the ordinary: a burst of stamps passes, a hole does not.
+const LONGEST_SPAN: i64 = 4;
+/// Samples before a run whose steps tell what is ordinary.
+const PAST: usize = 16;
+/// Change of the rate that nobody calls a spike, rad/s.
+const FLOOR: f64 = 0.02;
+/// Distance of a spike, in times of what is ordinary about it, where the accelerometer is quiet.
+const QUIET: f64 = 4.0;
+/// The same of a single sample, whatever the accelerometer says.
+const ANY: f64 = 6.0;
+/// Cosine between each sample's distance and their mean, above which a run lies on one side.
+const ONE_SIDE: f64 = 0.7;
+/// Steps of the specific force that are quiet, m/s^2, beyond twice the ordinary ones.
+const QUIET_FORCE: f64 = 0.5;
+/// Steps of quantisation that a spike exceeds.
+const QUANTA: f64 = 4.0;
+/// Change that is a spike after readings that never differed, rad/s: their quantisation is not known.
+const UNKNOWN_QUANTUM: f64 = 0.5;
+
+/// Looks for spikes in entries in time order.
+#[derive(Clone, Debug)]
+pub(super) struct Spikes {
+    past: Past,
+    /// The rest of a run that is being replaced: place in the stream, and the line's value.
+    run: [Option<(u64, Vector3<f64>)>; LONGEST - 1],
+    drops_force: bool,
+}
+
+/// The last samples, as far as the rule needs them.
+#[derive(Clone, Debug)]
+struct Past {
+    /// The last two rates, newest first.
+    rates: [Vector3<f64>; 2],
+    /// Specific forces before the next sample, newest first; the last one that came stands in for none.
+    forces: [Option<Vector3<f64>>; LONGEST + 2],
+    /// Squares of the largest change of the rate, and of the step of the force, at each of the last samples but the
+    /// newest.
+    changes: [(f64, f64); PAST],
+    at: usize,
+    count: usize,
+    last: Nanos,
+    /// Smallest change of one component so far, rad/s.
+    quantum: f64,
+}
+
+/// A run of samples against its neighbours.
+struct Run {
+    samples: usize,
+    /// Before and behind it.
+    ends: (Vector3<f64>, Vector3<f64>),
+    /// Least distance from the line, rad/s.
+    distance: f64,
+}
+
+impl Spikes {
+    /// The stage that `settings` ask for.
+    pub(super) fn of(settings: &Settings) -> Option<Spikes> {
+        let is_rate = matches!(settings.kind, SampleKind::Rate | SampleKind::Average);
+        let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window > LONGEST;
+        (is_on && is_rate).then(Spikes::new)
+    }
+
+    fn new() -> Spikes {
+        Spikes {
+            past: Past {
+                rates: [Vector3::zeros(); 2],
+                forces: [None; LONGEST + 2],
+                changes: [(0.0, 0.0); PAST],
+                at: 0,
+                count: 0,
+                last: Nanos(0),
+                quantum: f64::INFINITY,
+            },
+            run: [None; LONGEST - 1],
+            drops_force: false,
+        }
+    }
+
+    /// The entry to use instead of `entry`, or `None` for itself. `ahead` are those behind it in time; `spacing` is
+    /// the ordinary step, and `coarse` the clock's, if that is longer.
+    #[inline]
+    pub(super) fn repaired(
+        &mut self,
+        entry: &Entry,
+        ahead: &[Entry],
+        (spacing, coarse): (Option<i64>, Option<i64>),
+        count: &mut SpikeCount,
+    ) -> Option<Entry> {
+        let value = self.judged(entry, ahead, spacing, coarse);
+        let Some(value) = value else {
+            self.past.push(entry, &entry.value);
+            return None;
+        };
+        self.past.push(entry, &value);
+        count.samples += 1;
+        count.first.get_or_insert(entry.stamp);
+        count.largest = count.largest.max((entry.value - value).norm());
+        let status = Status(entry.status.0 & !Status::SATURATED.0);
+        Some(Entry {
+            value,
+            accel: match self.drops_force {
+                true => NO_ACCEL,
+                false => entry.accel,
+            },
+            status: status.with(Status::REPAIRED),
+            ..*entry
+        })
+    }
+
+    #[inline]
+    fn judged(
+        &mut self,
+        entry: &Entry,
+        ahead: &[Entry],
+        spacing: Option<i64>,
+        coarse: Option<i64>,
+    ) -> Option<Vector3<f64>> {
+        if let [Some((index, value)), rest] = self.run {
+            self.run = [rest, None];
+            if index == entry.index {
+                return Some(value);
+            }
+        }
+        let spacing = spacing.filter(|step| (1..=LONGEST_STEP_NANOS).contains(step))?;
+        if self.past.count <= PAST {
+            return None;
+        }
+        let most = (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize;
+        (1..=most).find_map(|samples| {
+            let run = Run::of(&self.past.rates[0], entry, ahead, samples)?;
+            let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
+            let longest = LONGEST_SPAN * (samples as i64 + 1) * spacing;
+            if !(0..=longest.saturating_add(coarse.unwrap_or(0))).contains(&span) {
+                return None;
+            }
+            self.begin(&run, entry, ahead)
+        })
+    }
+
+    /// The value of the first sample of `run`, if it is a spike.
+    #[cold]
+    fn begin(&mut self, run: &Run, entry: &Entry, ahead: &[Entry]) -> Option<Vector3<f64>> {
+        let (rate, force) = self.past.ordinary();
+        let ends_apart = (run.ends.1 - run.ends.0).norm();
+        let ratio = run.distance / (ends_apart + rate + FLOOR);
+        let step = self.past.force_step(entry, ahead, run.samples);
+        let is_quiet = step.is_some_and(|step| step < 2.0 * force + QUIET_FORCE);
+        let is_above_quanta = match self.past.quantum.is_finite() {
+            true => run.distance > QUANTA * self.past.quantum,
+            false => run.distance > UNKNOWN_QUANTUM,
+        };
+        let is_spike = (ratio > QUIET && is_quiet) || (run.samples == 1 && ratio > ANY);
+        if !(is_spike && is_above_quanta) {
+            return None;
+        }
+        self.drops_force = step.is_some() && !is_quiet;
+        for (n, slot) in self.run.iter_mut().enumerate() {
+            *slot = ahead
+                .get(n)
+                .filter(|_| n + 1 < run.samples)
+                .map(|next| (next.index, run.line(n + 1)));
+        }
+        Some(run.line(0))
+    }
+}
+
+impl Run {
+    /// The run of so many samples that begins at `entry`, where it can be a spike at all.
+    #[inline]
+    fn of(before: &Vector3<f64>, entry: &Entry, ahead: &[Entry], samples: usize) -> Option<Run> {
+        let behind = ahead.get(samples - 1)?;
+        if behind.epoch != entry.epoch {
+            return None;
+        }
+        let mut run = Run {
+            samples,
+            ends: (*before, behind.value),
+            distance: f64::INFINITY,
+        };
+        let apart = (run.ends.1 - run.ends.0).norm_squared();
+        let within = std::iter::once(entry).chain(ahead).take(samples);
+        let mut off = [Vector3::zeros(); LONGEST];
+        for (n, (off, sample)) in off.iter_mut().zip(within).enumerate() {
+            *off = sample.value - run.line(n);
+            let size = off.norm_squared();
+            // The cheap half of the rule: nearly every sample leaves here.
+            if size <= QUIET * QUIET * (apart + FLOOR * FLOOR) {
+                return None;
+            }
+            run.distance = run.distance.min(size);
+        }
+        run.distance = run.distance.sqrt();
+        let off = off.get(..samples)?;
+        let mean = off.iter().sum::<Vector3<f64>>() / samples as f64;
+        let is_on_one_side = off
+            .iter()
+            .all(|off| off.dot(&mean) > ONE_SIDE * off.norm() * mean.norm());
+        is_on_one_side.then_some(run)
+    }
+
+    /// The line between the neighbours at the `n`th sample.
+    #[inline]
+    fn line(&self, n: usize) -> Vector3<f64> {
+        let (before, behind) = &self.ends;
+        let share = (n + 1) as f64 / (self.samples + 1) as f64;
+        before + (behind - before) * share
+    }
+}
+
+impl Past {
+    /// Adds a sample with this rate, which may be the repaired one.
+    #[inline]
+    fn push(&mut self, entry: &Entry, rate: &Vector3<f64>) {
+        let [newest, older] = self.rates;
+        let step = (newest - older).norm_squared();
+        let bend = (newest - (older + rate) * 0.5).norm_squared();
+        let force = match self.forces {
+            [Some(newest), Some(older), ..] => (newest - older).norm_squared(),
+            _ => 0.0,
+        };
+        // The first two have no predecessors to differ from.
+        if self.count >= 2
+            && let Some(slot) = self.changes.get_mut(self.at)
+        {
+            *slot = (step.max(bend), force);
+            self.at = (self.at + 1) % PAST;
+        }
+        for (now, before) in rate.iter().zip(&newest) {
+            let change = (now - before).abs();
+            if self.count > 0 && change > 0.0 && change < self.quantum {
+                self.quantum = change;
+            }
+        }
+        self.rates = [*rate, newest];
+        let force = finite_accel(&entry.accel).or(self.forces[0]);
+        self.forces.rotate_right(1);
+        self.forces[0] = force;
+        self.count = self.count.saturating_add(1);
+        self.last = entry.stamp;
+    }
+
+    /// The largest change of the rate and of the force in the samples before the newest.
+    fn ordinary(&self) -> (f64, f64) {
+        let largest = self
+            .changes
+            .iter()
+            .fold((0.0_f64, 0.0_f64), |most, change| {
+                (most.0.max(change.0), most.1.max(change.1))
+            });
+        (largest.0.sqrt(), largest.1.sqrt())
+    }
+
+    /// The largest step of the force from as many samples before the run as are in it to one behind it; `None` without
+    /// forces.
+    fn force_step(&self, entry: &Entry, ahead: &[Entry], samples: usize) -> Option<f64> {
+        let before = self.forces.get(..=samples)?.iter().rev();
+        let mut last = (*before.clone().next()?)?;
+        let mut largest = 0.0_f64;
+        let following = std::iter::once(entry).chain(ahead).take(samples + 2);
+        let forces = before
+            .skip(1)
+            .copied()
+            .chain(following.map(|sample| finite_accel(&sample.accel)));
+        for force in forces.flatten() {
+            largest = largest.max((force - last).norm());
+            last = force;
+        }
+        Some(largest)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::indexing_slicing)]
+mod tests;

@@ -1,0 +1,213 @@
+//! Spikes that are found, and motion that is none. Numbers by an independent implementation are named where they stand.
+
+use crate::condition::{Conditioner, Report, Settings, SpikePolicy};
+use crate::record::{Measured, Nanos, RateSample, RawSample, SampleKind, Status};
+use nalgebra::{Rotation3, Vector3};
+
+const T0: i64 = 1_700_000_000_000_000_000;
+
+/// Numbers of mean 0 and deviation 1, uniform, from a 64-bit linear congruence.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut x = seed;
+    move || {
+        x = x
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((x >> 11) as f64 / 2_f64.powi(53) - 0.5) * 12_f64.sqrt()
+    }
+}
+
+/// A hand: still for 3 s, then roll, pitch and yaw swing by 50, 40 and 120 degrees. Rates in rad/s, forces in m/s^2.
+fn hand(secs: usize, hz: usize) -> Vec<RawSample> {
+    let mut noise = noise(1);
+    (0..secs * hz)
+        .map(|n| {
+            let t = n as f64 / hz as f64;
+            let v = (t - 3.0).clamp(0.0, 1.0);
+            let (u, du) = match v < 1.0 {
+                true => (v * v * (3.0 - 2.0 * v), 6.0 * v * (1.0 - v)),
+                false => (1.0, 0.0),
+            };
+            let swing = |degrees: f64, k: f64| {
+                let (sin, cos) = (k * (t - 3.0)).sin_cos();
+                let size = degrees.to_radians();
+                (size * sin * u, size * (k * cos * u + sin * du))
+            };
+            let ((r, dr), (p, dp), (y, dy)) =
+                (swing(50.0, 1.7), swing(40.0, 1.1), swing(120.0, 0.6));
+            let rate = Vector3::new(
+                dr - dy * p.sin(),
+                dp * r.cos() + dy * p.cos() * r.sin(),
+                dy * p.cos() * r.cos() - dp * r.sin(),
+            );
+            let force =
+                Rotation3::from_euler_angles(r, p, y).inverse() * Vector3::new(0.0, 0.0, 9.806_65);
+            let mut noisy = |v: Vector3<f64>, sigma: f64| {
+                [
+                    v.x + noise() * sigma,
+                    v.y + noise() * sigma,
+                    v.z + noise() * sigma,
+                ]
+            };
+            let gyro = noisy(rate, 0.1_f64.to_radians());
+            let accel = noisy(force, 0.03);
+            let _field = noisy(Vector3::zeros(), 0.0);
+            RawSample {
+                header: Some(Nanos(T0 + (n * 1_000_000_000 / hz) as i64)),
+                gyro: Some(gyro),
+                accel: Some(accel),
+                ..RawSample::default()
+            }
+        })
+        .collect()
+}
+
+fn add(raw: &mut RawSample, axis: usize, rate: f64) {
+    if let Some(value) = raw.gyro.as_mut().and_then(|gyro| gyro.get_mut(axis)) {
+        *value += rate;
+    }
+}
+
+/// Samples out of the conditioner, fed in pieces of so many.
+fn conditioned(settings: &Settings, raw: &[RawSample], piece: usize) -> (Vec<RateSample>, Report) {
+    let mut conditioner = Conditioner::new(settings).unwrap();
+    let mut out = Vec::new();
+    for piece in raw.chunks(piece) {
+        conditioner.push(piece, &mut out);
+    }
+    conditioner.finish(&mut out);
+    (out, conditioner.report().clone())
+}
+
+fn repaired(out: &[RateSample]) -> Vec<usize> {
+    let is_repaired = |(_, sample): &(usize, &RateSample)| sample.status.has(Status::REPAIRED);
+    let found = out.iter().enumerate().filter(is_repaired);
+    found.map(|(n, _)| n).collect()
+}
+
+fn rate(sample: &RateSample) -> Vector3<f64> {
+    match sample.gyro {
+        Measured::Rate(rate) => rate.0,
+        Measured::Increment(angle) => angle.0,
+    }
+}
+
+#[test]
+fn the_spikes_of_a_moving_hand_are_found_and_nothing_else() {
+    let clean = hand(40, 50);
+    let mut raw = clean.clone();
+    for (at, size) in [(300, 30.0), (411, 0.5), (640, 3.0), (1000, -8.0)] {
+        add(&mut raw[at], 2, size);
+    }
+    let (out, report) = conditioned(&Settings::default(), &raw, 7);
+    // The reference finds these three; 0.5 rad/s is motion like that around it. It is 30.0044572 rad/s off there.
+    assert_eq!(repaired(&out), [300, 640, 1000]);
+    assert_eq!(report.spikes.samples, 3);
+    assert_eq!(report.spikes.first, raw[300].header);
+    assert!(
+        (report.spikes.largest - 30.0044572).abs() < 1e-6,
+        "{report:?}"
+    );
+    let truth = conditioned(&Settings::default(), &clean, 2000).0;
+    for n in [300, 640, 1000] {
+        // A step of this motion is 0.06 rad/s at most.
+        assert!((rate(&out[n]) - rate(&truth[n])).norm() < 0.1);
+    }
+    assert!(repaired(&truth).is_empty());
+}
+
+#[test]
+fn a_run_of_three_is_bridged_and_a_longer_one_is_motion() {
+    let clean = hand(10, 400);
+    for (length, found) in [(1, 1), (2, 2), (3, 3), (5, 0), (8, 0)] {
+        let mut raw = clean.clone();
+        for sample in raw.iter_mut().skip(2000).take(length) {
+            add(sample, 0, 6.0);
+        }
+        let (out, report) = conditioned(&Settings::default(), &raw, 100);
+        assert_eq!(report.spikes.samples, found, "{length}");
+        let places: Vec<usize> = (2000..2000 + found as usize).collect();
+        assert_eq!(repaired(&out), places, "{length}");
+    }
+}
+
+#[test]
+fn a_blow_that_the_accelerometer_feels_is_kept_and_a_glitch_of_the_whole_bus_is_not() {
+    let clean = hand(10, 400);
+    let mut blow = clean.clone();
+    for (n, sample) in blow.iter_mut().skip(2000).take(2).enumerate() {
+        add(sample, 0, 6.0);
+        sample.accel = Some([20.0, 5.0 * n as f64, -10.0]);
+    }
+    assert_eq!(
+        conditioned(&Settings::default(), &blow, 99)
+            .1
+            .spikes
+            .samples,
+        0
+    );
+    // One sample alone of 30 rad/s is no blow; its force is as wrong as its rate.
+    let mut glitch = clean;
+    add(&mut glitch[2000], 0, 30.0);
+    glitch[2000].accel = Some([78.0, 78.0, -78.0]);
+    let (out, _) = conditioned(&Settings::default(), &glitch, 99);
+    assert_eq!(repaired(&out), [2000]);
+    assert!(out[2000].accel.is_none() && out[2001].accel.is_some());
+}
+
+#[test]
+fn spikes_are_the_same_however_samples_come_and_left_where_that_is_asked_or_nothing_waits() {
+    let mut raw = hand(10, 100);
+    for at in [310, 500, 502, 990] {
+        add(&mut raw[at], 1, -20.0);
+    }
+    let of = |settings: &Settings, piece: usize| conditioned(settings, &raw, piece);
+    let whole = of(&Settings::default(), raw.len());
+    assert_eq!(repaired(&whole.0), [310, 500, 502, 990]);
+    for piece in [1, 2, 17, 64] {
+        assert_eq!(of(&Settings::default(), piece), whole);
+    }
+    for settings in [
+        Settings {
+            spikes: SpikePolicy::Keep,
+            ..Settings::default()
+        },
+        Settings {
+            reorder_window: Settings::LIVE_WINDOW,
+            ..Settings::default()
+        },
+        Settings {
+            kind: SampleKind::DeltaAngle,
+            ..Settings::default()
+        },
+    ] {
+        assert_eq!(of(&settings, 10).1.spikes.samples, 0, "{settings:?}");
+    }
+}
+
+#[test]
+fn coarse_and_slow_rates_hold_no_spikes() {
+    // A rest that toggles by one step of 0.1 rad/s, and single flicks of a sensor at 20 Hz.
+    let mut coarse = hand(20, 100);
+    for (n, sample) in coarse.iter_mut().enumerate() {
+        sample.gyro = Some([0.0, if n % 37 == 36 { 0.1 } else { 0.0 }, 0.0]);
+    }
+    assert_eq!(
+        conditioned(&Settings::default(), &coarse, 50)
+            .1
+            .spikes
+            .samples,
+        0
+    );
+    let mut slow = hand(60, 20);
+    for at in [100, 400, 700] {
+        add(&mut slow[at], 0, 8.0);
+    }
+    assert_eq!(
+        conditioned(&Settings::default(), &slow, 50)
+            .1
+            .spikes
+            .samples,
+        0
+    );
+}
