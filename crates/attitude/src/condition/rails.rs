@@ -146,7 +146,9 @@ impl Side {
                 Some(last) if last == reading => self.run += u64::from(other_changed),
                 last => {
                     self.run = 1;
-                    last.map(|last| self.add_jump(reading - last));
+                    if let Some(last) = last {
+                        self.add_jump(reading - last);
+                    }
                 }
             }
             self.longest = self.longest.max(self.run);

@@ -14,9 +14,9 @@ const NEAR_MIDNIGHT: i64 = 600 * SECOND;
 /// Order of the numbers of a date.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum DateOrder {
-    YearFirst,
-    MonthFirst,
-    DayFirst,
+    YearMonthDay,
+    MonthDayYear,
+    DayMonthYear,
 }
 
 impl DateOrder {
@@ -29,22 +29,22 @@ impl DateOrder {
             let (numbers, separator) = numbers(date)?;
             let [first, second, _] = numbers;
             if first > 31 {
-                found = Some((DateOrder::YearFirst, true));
+                found = Some((DateOrder::YearMonthDay, true));
                 continue;
             }
             is_day_first |= first > 12;
             is_month_first |= second > 12;
             // With points the day is first, wherever points are written.
             found = found.or(Some(match separator {
-                '.' => (DateOrder::DayFirst, true),
-                _ => (DateOrder::MonthFirst, false),
+                '.' => (DateOrder::DayMonthYear, true),
+                _ => (DateOrder::MonthDayYear, false),
             }));
         }
         match (found?, is_day_first, is_month_first) {
-            ((DateOrder::YearFirst, _), ..) => Some((DateOrder::YearFirst, true)),
+            ((DateOrder::YearMonthDay, _), ..) => Some((DateOrder::YearMonthDay, true)),
             (_, true, true) => None,
-            (_, true, false) => Some((DateOrder::DayFirst, true)),
-            (_, false, true) => Some((DateOrder::MonthFirst, true)),
+            (_, true, false) => Some((DateOrder::DayMonthYear, true)),
+            (_, false, true) => Some((DateOrder::MonthDayYear, true)),
             (found, false, false) => Some(found),
         }
     }
@@ -53,9 +53,9 @@ impl DateOrder {
     pub(super) fn midnight(self, date: &str) -> Option<Nanos> {
         let ([a, b, c], _) = numbers(date)?;
         let (year, month, day) = match self {
-            DateOrder::YearFirst => (a, b, c),
-            DateOrder::MonthFirst => (c, a, b),
-            DateOrder::DayFirst => (c, b, a),
+            DateOrder::YearMonthDay => (a, b, c),
+            DateOrder::MonthDayYear => (c, a, b),
+            DateOrder::DayMonthYear => (c, b, a),
         };
         let year = if year < 100 { year + 2000 } else { year };
         let is_date =
@@ -242,14 +242,14 @@ mod tests {
     #[test]
     fn the_order_of_a_date_shows_or_is_said_not_to() {
         let of = |dates: &[&str]| DateOrder::of(dates.iter().copied());
-        assert_eq!(of(&["03/30/2025"]), Some((DateOrder::MonthFirst, true)));
+        assert_eq!(of(&["03/30/2025"]), Some((DateOrder::MonthDayYear, true)));
         assert_eq!(
             of(&["03/04/2025", "13/04/2025"]),
-            Some((DateOrder::DayFirst, true))
+            Some((DateOrder::DayMonthYear, true))
         );
-        assert_eq!(of(&["2025/03/04"]), Some((DateOrder::YearFirst, true)));
-        assert_eq!(of(&["3.4.25"]), Some((DateOrder::DayFirst, true)));
-        assert_eq!(of(&["03/04/2025"]), Some((DateOrder::MonthFirst, false)));
+        assert_eq!(of(&["2025/03/04"]), Some((DateOrder::YearMonthDay, true)));
+        assert_eq!(of(&["3.4.25"]), Some((DateOrder::DayMonthYear, true)));
+        assert_eq!(of(&["03/04/2025"]), Some((DateOrder::MonthDayYear, false)));
         assert_eq!(
             of(&["13/14/2025"]).map(|(order, _)| order.midnight("13/14/2025")),
             None
@@ -258,8 +258,8 @@ mod tests {
         assert_eq!(of(&["-0.25"]), None);
         // `date -u -d 2025-03-30 +%s`.
         let day = Some(Nanos(1_743_292_800 * SECOND));
-        assert_eq!(DateOrder::MonthFirst.midnight("03/30/2025"), day);
-        assert_eq!(DateOrder::DayFirst.midnight("30.3.25"), day);
+        assert_eq!(DateOrder::MonthDayYear.midnight("03/30/2025"), day);
+        assert_eq!(DateOrder::DayMonthYear.midnight("30.3.25"), day);
     }
 
     #[test]

@@ -74,7 +74,7 @@ impl Roles<'_> {
             let is_other = values.is_measured || values.distinct == 0;
             let is_taken = match values.distinct {
                 1 => is_clear,
-                _ => !is_many && !(is_counter && !is_clear),
+                _ => !is_many && (is_clear || !is_counter),
             };
             if is_taken && !is_other {
                 columns.push(at);
