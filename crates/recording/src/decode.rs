@@ -120,6 +120,8 @@ pub struct Options {
     /// Index of the stamp to read when a message has several: 0 is the message's own, then those of nested
     /// messages from the outside in ([`Decoder::stamps`]).
     pub nth_stamp: usize,
+    /// Stamps are not read, since the samples' time is another: whether their unit is right is nobody's concern.
+    pub are_stamps_unread: bool,
 }
 
 impl Options {

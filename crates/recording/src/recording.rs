@@ -8,18 +8,18 @@
 //! ```text
 //! path, stream -> input -> opened (survey, first messages, sources) -> topics -> samples
 //!     folder, line_input, text_log: beside it                  topic_plan, channel_route: on the workers
-//! what comes once -> incoming -> messages, sensor_lines
-//! lines, whether they come once or more often -> line_reader -> sensor_lines, text_log
+//! what comes once -> incoming -> messages, lines
+//! lines, whether they come once or more often -> line_reader -> text_channels, text_log
 //! ```
 //!
 //! | file | |
 //! |---|---|
 //! | [`input`], `folder`, `line_input`, [`incoming`] | what can be read again, the recording in a folder, lines and rows, what comes once |
-//! | [`opened`], `text_log`, [`log_channel`], [`payload_type`], [`sources`] | what is in a log, or in a text; what a channel can serve as; the type of its payloads; who speaks on a topic |
+//! | [`opened`], [`text_log`], `text_channels`, [`log_channel`], [`payload_type`], [`sources`] | what is in a log, or in a text; the channels of a text; what a channel can serve as; the type of its payloads; who speaks on a topic |
 //! | `line_reader`, `sample_cache` | the samples of lines, sensor by sensor; those of a text, kept for the next walk |
 //! | [`selection`], [`topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
-//! | `samples`, [`topic_plan`], [`topic_reading`], [`sensor_lines`] | how a topic is read, and which messages are its own; all samples that are selected, one topic, one sensor of a text that comes once |
+//! | `samples`, [`topic_plan`], [`topic_reading`] | how a topic is read, and which messages are its own; all samples that are selected, one topic |
 //! | [`made_before`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
 
@@ -42,11 +42,11 @@ pub mod payload_type;
 mod sample_cache;
 mod samples;
 pub mod selection;
-pub mod sensor_lines;
 mod several;
 pub mod sources;
 pub mod stated_nanos;
-mod text_log;
+mod text_channels;
+pub mod text_log;
 pub mod topic_plan;
 pub mod topic_reading;
 pub mod topics;

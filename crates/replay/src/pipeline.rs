@@ -7,7 +7,7 @@
 //!
 //! | file | |
 //! |---|---|
-//! | `replay`, `replay_stream`, `lines` | the same run over a file, a stream that comes once, and lines |
+//! | `replay`, `replay_stream`, `stream_topic` | the same run over a file, and over what comes once; the topic of that |
 //! | `logged` | the recording that a command line names, what is to be known of it logged |
 //! | `channel_choice` | which topics are read, under which names, held against which reference |
 //! | `replay_start`, `session_builder`, `session`, `delivery`, `pace`, `position`, `audience` | a run under way: what waits, what goes out, when, and who may stop it |
@@ -25,7 +25,6 @@ mod each;
 mod history;
 pub mod in_memory;
 pub mod inspection;
-mod lines;
 pub mod logged;
 pub mod pace;
 pub mod position;
@@ -41,5 +40,6 @@ pub mod samples;
 mod session;
 pub mod session_builder;
 pub mod simulate;
+mod stream_topic;
 mod summarise;
 mod unmet;

@@ -128,7 +128,7 @@ fn standard_input_that_is_empty_or_no_log_is_called_so() {
 }
 
 #[test]
-fn two_sensors_in_one_stream_of_lines_are_not_mixed() {
+fn of_two_sensors_in_lines_that_come_once_the_first_is_taken_and_the_other_named() {
     let dir = bench();
     let line = |id: &str, n: u64| {
         format!(
@@ -136,14 +136,44 @@ fn two_sensors_in_one_stream_of_lines_are_not_mixed() {
         )
     };
     let text = line("left", 1) + &line("right", 1) + &line("left", 2);
-    strapd_fed(dir.path(), "replay - -o null:", text.clone().into_bytes())
-        .refused(1, &["line 2", "`right`", "--topic"]);
-    let one = strapd_fed(
-        dir.path(),
-        "replay - -o null: --topic left --json",
-        text.into_bytes(),
+    let at = dir.path();
+    for (flags, sensor, total) in [("", "left", 2), ("--topic right", "right", 1)] {
+        let command = format!("replay - -o null: --json {flags}");
+        let one = strapd_fed(at, &command, text.clone().into_bytes());
+        let (topic, other) = (one.json()["topics"][0].clone(), one.json().to_string());
+        assert_eq!(topic["topic"], sensor, "{one:?}");
+        assert_eq!(topic["samples"]["total"], total, "{one:?}");
+        assert!(other.contains("several-topics"), "{one:?}");
+    }
+    // Of a file all are known: none is taken for the one that is meant.
+    std::fs::write(at.join("two.ndjson"), text).unwrap();
+    strapd(at, "replay two.ndjson -o null:").refused(
+        1,
+        &["left  RATE [NDJSON]  2 messages", "right  RATE", "--topic"],
     );
-    assert_eq!(one.json()["topics"][0]["samples"]["total"], 2, "{one:?}");
+}
+
+#[test]
+fn attitudes_beside_the_samples_of_a_sensor_are_no_other_sensor() {
+    let dir = bench();
+    let at = dir.path();
+    let line = |n: u64| {
+        format!(
+            "{{\"id\":\"a\",\"stamp\":{{\"sec\":{n},\"nsec\":0}},\"gyro\":[0.1,0,0]}}\n\
+             {{\"class\":\"ATT\",\"id\":\"a\",\"stamp\":{{\"sec\":{n},\"nsec\":0}},\"q\":{{\"w\":1,\"x\":0,\"y\":0,\"z\":0}},\"rate\":[0.1,0,0]}}\n\
+             {{\"stamp\":{{\"sec\":{n},\"nsec\":5}},\"orientation\":{{\"w\":1,\"x\":0,\"y\":0,\"z\":0}}}}\n"
+        )
+    };
+    let text: String = (1..40).map(line).collect();
+    std::fs::write(at.join("mixed.ndjson"), &text).unwrap();
+    let piped = strapd_fed(at, "replay - -o null: --json", text.into_bytes());
+    for ran in [piped, strapd(at, "replay mixed.ndjson -o null: --json")] {
+        let topic = ran.done().json()["topics"][0].clone();
+        assert_eq!(topic["topic"], "a", "{ran:?}");
+        assert_eq!(topic["samples"]["total"], 39, "{ran:?}");
+        let warnings = topic["warnings"].to_string();
+        assert!(!warnings.contains("taken"), "{ran:?}");
+    }
 }
 
 #[test]

@@ -66,7 +66,8 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
 /// Returns whether stamps that are nanoseconds by their name are held against their steps. Tables of other makers were,
 /// by their first rows; a unit that the user states is believed.
 pub(super) fn are_judged(lines: &Lines<impl Read>, options: &Options) -> bool {
-    lines.table().is_none_or(Table::is_own) && !options.states_stamp_unit()
+    let is_stated = options.are_stamps_unread || options.states_stamp_unit();
+    !is_stated && lines.table().is_none_or(Table::is_own)
 }
 
 /// Error for what begins with no line of samples.
@@ -82,6 +83,26 @@ pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodabl
     Error::Unsupported {
         path: path.to_owned(),
         what: Diagnostic::new(format!("line {}: {why}", lines.number())).help(help),
+    }
+}
+
+/// Error for a text without any rate, `or_else` something else that was looked for.
+pub(super) fn no_rates(path: &Path, format: Format, or_else: &str) -> Error {
+    let (line, help) = match format.is_table() {
+        true => (
+            "row",
+            format!("columns gyro_x, gyro_y, gyro_z, in rad/s, or {COLUMNS} gyro=NAME:NAME:NAME"),
+        ),
+        false => (
+            "line",
+            format!(
+                "{{\"class\":\"RATE\",\"stamp\":{{\"sec\":1,\"nsec\":0}},\"gyro\":[0.1,0,0]}}, or {FIELD} gyro=PATH"
+            ),
+        ),
+    };
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: Diagnostic::new(format!("no {line} carries a body rate{or_else}")).help(help),
     }
 }
 

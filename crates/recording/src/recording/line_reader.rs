@@ -6,7 +6,7 @@
 use super::bare_stamps::BareStamps;
 use super::early_besides::{EarlyBesides, are_beside};
 use super::line_input::{is_sure, no_samples, unclear};
-use crate::decode::{Line, Undecodable};
+use crate::decode::{Class, Line, Undecodable};
 use crate::error::Error;
 use crate::format::Format;
 use crate::lines::Lines;
@@ -25,14 +25,12 @@ pub(super) type Key = (String, bool);
 /// Content of a line, of the sensor of this place in the order of appearance.
 #[derive(Debug)]
 pub(super) enum LineEvent<'s, R> {
-    /// A sensor that is new, and its first line.
-    Met(&'s Key, &'s Line, &'s Lines<R>),
+    /// A sensor that is new, its first line, and the samples in it.
+    Met(&'s Key, &'s Line, &'s [RawSample]),
     /// Samples whose stamps are known by now; more may still wait.
     Samples(usize, &'s [RawSample]),
     /// Number of a line that holds none, behind one of this sensor.
     Undecodable(usize, u64, Undecodable),
-    /// A line with nothing but forces or fields, of a sensor that is still to come.
-    Held(&'s Lines<R>),
     /// The end of a line.
     LineOver(&'s Lines<R>, &'s Sensors),
 }
@@ -76,20 +74,29 @@ impl Sensors {
     }
 }
 
-/// Reads a text to its end, or until `take` has enough. `sensor_of` says whose samples a line holds; `None` passes the
-/// line over.
+/// Returns the sensor of a line; `None` of status and the like between samples.
+fn sensor_of(line: &mut Line, samples: &[RawSample]) -> Option<Key> {
+    // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
+    let is_own = line.class == Class::Rate && !samples.is_empty();
+    let has_rate = is_own || samples.iter().any(|raw| raw.gyro.is_some());
+    let is_sample = has_rate || samples.iter().any(|raw| raw.orientation.is_some());
+    let is_attitude = line.class == Class::Att || !has_rate;
+    is_sample.then(|| (line.id.take().unwrap_or_default(), is_attitude))
+}
+
+/// Reads a text to its end, or until `take` has enough.
 ///
 /// # Errors
-/// It cannot be read, or begins with no line of samples; the unit of stamps is not clear; as `sensor_of` and `take`.
+/// It cannot be read, or begins with no line of samples; the unit of stamps is not clear; as `take`.
 pub(super) fn read<R: Read, E: From<Error>>(
     lines: &mut Lines<R>,
     path: &Path,
-    mut sensor_of: impl FnMut(&mut Line, &[RawSample], &Lines<R>) -> Result<Option<Key>, E>,
     mut take: impl FnMut(LineEvent<'_, R>) -> Result<ControlFlow<()>, E>,
 ) -> Result<Sensors, E> {
     let mut sensors = Sensors::default();
     let (mut samples, mut known) = (Vec::new(), Vec::new());
-    let mut before = None;
+    // The sensor of the line before, and the last one with rates.
+    let (mut before, mut rated) = (None, None);
     // Rows under a header that is known are of a table, though the first be none.
     let (mut early, mut first_bad) = (Vec::new(), None);
     let mut early_besides = EarlyBesides::default();
@@ -106,34 +113,38 @@ pub(super) fn read<R: Read, E: From<Error>>(
             }
             (Err(why), Some(place)) => Some(LineEvent::Undecodable(place, lines.number(), why)),
             // Of another sensor of the device than the gyro.
-            (Ok(line), _) if are_beside(&line, &mut samples) => {
-                match sensors.owner(&line, before) {
-                    Some((place, bare)) => {
-                        stamped(bare, &mut samples, &line, path, &mut known)?;
-                        (!known.is_empty()).then_some(LineEvent::Samples(place, &known))
-                    }
-                    None => {
-                        early_besides.hold(line, &mut samples);
-                        Some(LineEvent::Held(lines))
-                    }
+            (Ok(line), _) if are_beside(&line, &mut samples) => match sensors.owner(&line, rated) {
+                Some((place, bare)) => {
+                    stamped(bare, &mut samples, &line, path, &mut known)?;
+                    (!known.is_empty()).then_some(LineEvent::Samples(place, &known))
                 }
-            }
+                None => {
+                    early_besides.hold(line, &mut samples);
+                    None
+                }
+            },
             (Ok(mut line), _) => {
-                let key = sensor_of(&mut line, &samples, lines)?;
+                let key = sensor_of(&mut line, &samples);
                 let place = key.as_ref().and_then(|key| sensors.place_of(key));
                 if let Some((key, place)) = key.zip(place) {
                     if place == sensors.bare.len() {
-                        if take(LineEvent::Met(&key, &line, lines))?.is_break() {
+                        if take(LineEvent::Met(&key, &line, &samples))?.is_break() {
                             return Ok(sensors);
                         }
                         let mut bare = BareStamps::default();
-                        for (line, mut samples) in early_besides.release(&key.0) {
+                        let (id, is_attitude) = &key;
+                        let early_ones = match is_attitude {
+                            true => Vec::new(),
+                            false => early_besides.release(id),
+                        };
+                        for (line, mut samples) in early_ones {
                             stamped(&mut bare, &mut samples, &line, path, &mut known)?;
                         }
                         sensors.bare.push(bare);
-                        sensors.places.insert(key, place);
+                        sensors.places.insert(key.clone(), place);
                     }
                     before = Some(place);
+                    rated = if key.1 { rated } else { before };
                     for (number, why) in early.drain(..) {
                         let lost = LineEvent::Undecodable(place, number, why);
                         if take(lost)?.is_break() {

@@ -23,6 +23,10 @@ pub struct LogChannel {
     pub role: Role,
     /// Meaning of its samples, where they come as such.
     pub stated: Option<Stated>,
+    /// Type of the samples of a text, with how its columns are read.
+    pub(super) read_as: Option<PayloadType>,
+    /// Whether these are the attitudes of a sensor of a text whose samples are another channel.
+    pub is_derived: bool,
 }
 
 impl LogChannel {
@@ -35,7 +39,15 @@ impl LogChannel {
             described: described(&self.channel).to_string(),
             messages: Some(self.messages),
             rank: self.rank(),
+            is_derived: self.is_derived,
         }
+    }
+
+    /// Type of its payloads, as a run names it.
+    #[must_use]
+    pub fn read_as(&self) -> PayloadType {
+        let of_text = self.read_as.clone();
+        of_text.unwrap_or_else(|| described(&self.channel))
     }
 
     /// The [`rank`] of its role: 0 for a channel without a message, whatever its type.
@@ -154,6 +166,8 @@ pub fn known(
         openings: Vec::new(),
         role,
         stated: None,
+        read_as: None,
+        is_derived: false,
     }
 }
 

@@ -6,7 +6,7 @@
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
 use super::input::Input;
-use super::line_input::only_for_tables;
+use super::line_input::{no_rates, only_for_tables};
 use super::log_channel::{LogChannel, described, known, nanos, rank};
 use super::made_before::{self, MadeBefore};
 use super::parts::{self, Same, Whole};
@@ -42,6 +42,10 @@ pub struct Recording {
     /// Problems found as far as it was read: all of it when it has no summary, otherwise up
     /// to the first message of the last channel.
     pub problems: Vec<String>,
+    /// Notes for the reader of its tables.
+    notes: Vec<String>,
+    /// Why the unit of its rates may be another one.
+    doubt: Option<String>,
 }
 
 /// Body of a log as it is read again.
@@ -65,6 +69,12 @@ impl Recording {
     /// # Errors
     /// It cannot be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
+        let log = Recording::surveyed(input, options, pool)?;
+        log.say_notes();
+        Ok(log)
+    }
+
+    fn surveyed(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
         match input.parts().len() {
             0 => Recording::of_one(input, options, sample_cache::MOST, pool),
             _ => Recording::of_parts(input, options, pool),
@@ -77,8 +87,11 @@ impl Recording {
             only_for_tables(input.name(), input.format(), options)?;
             return Recording::of_mcap(input, pool);
         }
-        let (text, channels) = TextLog::survey(input, options, kept)?;
+        let (mut text, channels) = TextLog::survey(input, options, kept)?;
+        let (notes, doubt) = std::mem::take(&mut text.notes);
         Ok(Recording {
+            notes,
+            doubt,
             input: input.clone(),
             survey: text.surveyed().clone(),
             body: Body::Text(Box::new(text)),
@@ -94,6 +107,7 @@ impl Recording {
         let kept = sample_cache::IN_MEMORY / input.parts().len().max(1) as u64;
         for path in input.parts() {
             let log = Recording::of_one(&Input::open(path, input.warn())?, options, kept, pool)?;
+            log.say_notes();
             logs.push((parts::times(path, &log.survey)?, log));
         }
         logs.sort_by_key(|(times, _)| *times);
@@ -107,6 +121,8 @@ impl Recording {
         }
         Ok(Recording {
             input: input.clone(),
+            notes: Vec::new(),
+            doubt: None,
             body: Body::Parts(body),
             survey: whole.survey,
             sources: sources::by_topic(&whole.channels),
@@ -149,6 +165,8 @@ impl Recording {
                 whole => whole,
             },
             input: input.clone(),
+            notes: Vec::new(),
+            doubt: None,
             body: Body::Mcap(reader),
             survey,
             sources: sources::by_topic(&channels),
@@ -167,7 +185,22 @@ impl Recording {
         options: &Options,
         pool: &Pool,
     ) -> Result<Recording> {
-        let mut log = Recording::of(input, options, pool)?;
+        let log = Recording::told_apart_with_notes(input, named, options, pool)?;
+        log.say_notes();
+        Ok(log)
+    }
+
+    /// The same for whoever reports its [`Recording::notes`] elsewhere than in warnings.
+    ///
+    /// # Errors
+    /// As [`Recording::of`].
+    pub fn told_apart_with_notes(
+        input: &Input,
+        named: Option<&str>,
+        options: &Options,
+        pool: &Pool,
+    ) -> Result<Recording> {
+        let mut log = Recording::surveyed(input, options, pool)?;
         let told = {
             let readers: Vec<(Reader, Known<'_>)> = match &log.body {
                 Body::Parts(parts) => parts
@@ -196,6 +229,19 @@ impl Recording {
             log.sources = told;
         }
         Ok(log)
+    }
+
+    /// Notes on how its table is read; that the unit of its rates may be another one only if that is not `stated`.
+    pub fn notes(&self, stated: bool) -> impl Iterator<Item = &String> {
+        let doubt = self.doubt.iter().filter(move |_| !stated);
+        self.notes.iter().chain(doubt)
+    }
+
+    fn say_notes(&self) {
+        for note in self.notes(false) {
+            let said = format!("{}: {note}", self.name().display());
+            self.input.warn().say(&said);
+        }
     }
 
     /// The source of this name. `TOPIC@FRAME` is one even if nobody named that frame so far.
@@ -456,6 +502,7 @@ impl Recording {
             // How many of a channel's messages are whose is known at the end.
             messages: (!is_shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
             rank: self.channels_of(source).map(rank_of).max().unwrap_or(0),
+            is_derived: first.is_some_and(|known| known.is_derived),
         }
     }
 }
@@ -469,6 +516,9 @@ pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> 
     else {
         return error;
     };
+    if let Some(format) = channels.iter().find_map(|known| known.channel.text) {
+        return no_rates(&path, format, "");
+    }
     let sounds_like_one = |k: &&LogChannel| {
         let name = k.channel.schema.as_deref().map_or("", |s| &s.name);
         !k.role.has_rate && name.to_ascii_lowercase().contains("imu")

@@ -1,31 +1,34 @@
-//! A file of lines or rows -> the channels of a log, and its samples. I/O.
+//! Lines of a text -> the channels of a log, and the items of its samples, in the order of the lines. I/O.
 //!
-//! Apart from the log because nothing in a text is defined before it comes: which sensors there are, and what their
-//! samples mean, is known when all of it has been read, which is once. A sensor is a channel, of the name its lines
-//! say; attitudes are another one than samples.
+//! Apart from the log because nothing in a text is defined before it comes. Of a file all of it is read, which is once,
+//! and then it is known which sensors there are; of lines that come once a sensor is a channel from its first line on, and
+//! what is known goes on before the next line is waited for.
 
+use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
 use super::input::{Bytes, Input};
-use super::line_input::{are_judged, described};
-use super::line_reader::{Key, LineEvent, MOST_SENSORS, read};
+use super::line_input::{are_judged, no_rates};
+use super::line_reader::{LineEvent, MOST_SENSORS, Sensors, read};
 use super::log_channel::LogChannel;
 use super::sample_cache::{CacheWriter, SampleCache};
-use crate::attitude_line::TRUTH_ID;
-use crate::decode::{Class, Line, Options, Rank, Role, Stated};
+use super::text_channels::TextChannels;
+use crate::decode::Options;
 use crate::delimited::Table;
 use crate::error::{Error, Result};
-use crate::format::Format;
 use crate::lines::Lines;
-use crate::mcap::{Channel, ChannelSurvey, Schema, Survey};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::mcap::{Channel, Survey};
+use std::io::Read;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::record::{Declared, RawSample};
 
 /// Items that go through the pipeline together.
 const BATCH: usize = 1024;
-/// Name of samples that name no sensor.
-const UNNAMED: &str = "imu";
+/// Steps between stamps after which the unit of their name is judged, of lines that come once; fewer are judged at the
+/// end.
+const STEPS: u64 = 4096;
+/// Lines without any rate after which this is no log of samples, of lines that come once.
+const PATIENCE: u64 = 1000;
 
 /// A text, read once.
 #[derive(Debug)]
@@ -34,28 +37,10 @@ pub(super) struct TextLog {
     options: Options,
     channels: Vec<Arc<Channel>>,
     survey: Survey,
+    /// Notes for the reader of its tables, and why the unit of its rates may be another one.
+    pub(super) notes: (Vec<String>, Option<String>),
     /// Samples, if they are few enough to be kept.
     cache: Option<SampleCache>,
-}
-
-/// Channel as far as it was met.
-struct Met {
-    stated: Stated,
-    class: String,
-    messages: u64,
-    times: Option<(u64, u64)>,
-}
-
-/// Returns the sensor of a line, whose attitudes are another one; `None` of status and the like between samples.
-fn sensor_of<E>(
-    line: &mut Line,
-    samples: &[RawSample],
-    _: &Lines<Bytes>,
-) -> std::result::Result<Option<Key>, E> {
-    let says_something = |s: &RawSample| s.gyro.is_some() || s.orientation.is_some();
-    let is_sample = line.class == Class::Rate || samples.iter().any(says_something);
-    let is_attitude = line.class == Class::Att;
-    Ok(is_sample.then(|| (line.id.take().unwrap_or_default(), is_attitude)))
 }
 
 impl TextLog {
@@ -66,64 +51,35 @@ impl TextLog {
         kept: u64,
     ) -> Result<(TextLog, Vec<LogChannel>)> {
         let mut lines = input.lines(options)?;
-        let declared = lines.declared();
-        let table = lines.table().cloned();
-        let description = match &table {
-            Some(table) if !table.is_own() => described(&lines).to_string(),
-            _ => "fields by name, in each line".to_owned(),
-        };
-        let doubt = table.as_ref().and_then(Table::doubt_of_unit);
-        for note in lines.notes().iter().chain(&doubt) {
-            input
-                .warn()
-                .say(&format!("{}: {note}", input.name().display()));
-        }
-        let (mut met, mut cache) = (Vec::<(Key, Met)>::new(), CacheWriter::new(kept));
+        let mut met = TextChannels::of(&lines, options);
+        let notes = (lines.notes(), doubt_of_unit(&lines));
+        let mut cache = CacheWriter::new(kept);
         let take = |event: LineEvent<'_, Bytes>| -> Result<_> {
             match &event {
-                LineEvent::Met(key, line, _) => {
-                    let first = Met::new(line, options, &declared, &description);
-                    met.push(((*key).clone(), first));
-                }
-                LineEvent::Samples(place, samples) => {
-                    if let Some((_, met)) = met.get_mut(*place) {
-                        met.take(samples);
-                    }
-                }
+                LineEvent::Met(key, line, ..) => met.meet(key, line),
+                LineEvent::Samples(place, samples) => met.take(*place, samples),
                 _ => {}
             }
             cache.push(event);
             Ok(ControlFlow::Continue(()))
         };
-        let sensors = read(&mut lines, input.name(), sensor_of, take)?;
+        let sensors = read(&mut lines, input.name(), take)?;
         if are_judged(&lines, options) {
             sensors.check_nanos(input.name(), lines.format())?;
         }
-        if met.is_empty() {
-            return Err(Error::Unsupported {
-                path: input.name().to_owned(),
-                what: format!(
-                    "no {} carries a body rate or an orientation",
-                    if input.format().is_table() {
-                        "row"
-                    } else {
-                        "line"
-                    }
-                )
-                .into(),
-            });
+        let channels = met.channels();
+        if channels.is_empty() {
+            let or_else = " or an orientation";
+            return Err(no_rates(input.name(), input.format(), or_else));
         }
-        let channels = named(met, input.format());
         let mut survey = Survey {
             file_size: Some(lines.offset()),
-            channels: channels.iter().map(surveyed).collect(),
-            messages: channels.iter().map(|(known, _)| known.messages).sum(),
+            channels: met.surveyed(&channels),
+            messages: channels.iter().map(|known| known.messages).sum(),
+            times: met.times(),
             ..Survey::default()
         };
         survey.facts.format = input.format();
-        for times in channels.iter().filter_map(|(_, times)| *times) {
-            survey.times = Some(spanning(survey.times, times));
-        }
         if sensors.left_out > 0 {
             input.warn().say(&format!(
                 "{}: {} lines are of more than {MOST_SENSORS} sensors, and were left out",
@@ -131,12 +87,12 @@ impl TextLog {
                 sensors.left_out
             ));
         }
-        let channels: Vec<LogChannel> = channels.into_iter().map(|(known, _)| known).collect();
         let log = TextLog {
             input: input.clone(),
             options: options.clone(),
             channels: channels.iter().map(|known| known.channel.clone()).collect(),
             survey,
+            notes,
             cache: cache.finish(),
         };
         Ok((log, channels))
@@ -150,32 +106,21 @@ impl TextLog {
     /// Gives the items of the channels that have a way, in the order of the lines: as they were kept, or read once more.
     pub(super) fn walk<E: From<Error>>(
         &self,
-        mut select: impl FnMut(&Arc<Channel>) -> Option<Route>,
+        select: impl FnMut(&Arc<Channel>) -> Option<Route>,
         mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
     ) -> std::result::Result<(), E> {
-        let routes: Vec<Option<Route>> = self.channels.iter().map(&mut select).collect();
-        let mut items = Vec::with_capacity(BATCH);
+        let mut out = RoutedItems {
+            routes: self.channels.iter().map(select).collect(),
+            items: Vec::with_capacity(BATCH),
+        };
         let mut is_over = false;
         let mut each = |event: LineEvent<'_, Bytes>| -> std::result::Result<_, E> {
-            let route = |place: usize| routes.get(place).and_then(Option::as_ref);
-            match event {
-                LineEvent::Samples(place, samples) => {
-                    if let Some(route) = route(place) {
-                        route.pass(samples, &mut items);
-                    }
-                }
-                LineEvent::Undecodable(place, number, why) => {
-                    if let Some(route) = route(place) {
-                        route.lose(number, why, &mut items);
-                    }
-                }
-                _ => {}
-            }
-            if items.len() < BATCH {
+            out.add(event);
+            if out.items.len() < BATCH {
                 return Ok(ControlFlow::Continue(()));
             }
-            let flow = take(&mut items)?;
-            items.clear();
+            let flow = take(&mut out.items)?;
+            out.items.clear();
             is_over = flow.is_break();
             Ok(flow)
         };
@@ -184,122 +129,111 @@ impl TextLog {
             Some(walked) => walked?,
             None => {
                 let mut lines = self.input.lines(&self.options)?;
-                read(&mut lines, self.input.name(), sensor_of, each)?;
+                read(&mut lines, self.input.name(), each)?;
             }
         }
-        if !is_over && !items.is_empty() {
-            let _ = take(&mut items)?;
+        if !is_over && !out.items.is_empty() {
+            let _ = take(&mut out.items)?;
         }
         Ok(())
     }
 }
 
-impl Met {
-    fn new(line: &Line, options: &Options, declared: &Declared, description: &str) -> Met {
-        Met {
-            stated: Stated {
-                declared: Declared {
-                    interval_unit_given: options.states_interval_unit(),
-                    sample_kind: line.sample_kind,
-                    gyro_unit: line.gyro_unit,
-                    ..declared.clone()
-                },
-                has_stamp: true,
-                description: description.to_owned(),
-                ..Stated::default()
-            },
-            class: match &line.class {
-                Class::None => String::new(),
-                Class::Rate => "RATE".to_owned(),
-                Class::Att => "ATT".to_owned(),
-                Class::Imu => "IMU".to_owned(),
-                Class::Other(name) => name.clone(),
-            },
-            messages: 0,
-            times: None,
-        }
-    }
-
-    fn take(&mut self, samples: &[RawSample]) {
-        for sample in samples {
-            self.stated.has_accel |= sample.accel.is_some();
-            self.stated.has_mag |= sample.mag.is_some();
-        }
-        for sample in samples.iter().filter(|raw| !raw.is_beside) {
-            self.messages += 1;
-            self.stated.has_gyro |= sample.gyro.is_some();
-            self.stated.has_orientation |= sample.orientation.is_some();
-            self.stated.has_interval |= sample.interval_nanos.is_some();
-            if let Ok(log) = u64::try_from(sample.log.0) {
-                self.times = Some(spanning(self.times, (log, log)));
+/// Reads lines that come once, to their end or until `take` has enough. `select` says the way of a channel's samples when
+/// it is met; `take` gets their items, to be taken out of the vector, and whether the next line may be long in coming.
+/// The channels that were met.
+///
+/// # Errors
+/// They cannot be read, or carry no rate; as `take`.
+pub fn walk_once<R: Read, E: From<Error>>(
+    mut lines: Lines<R>,
+    (path, options): (&Path, &Options),
+    mut select: impl FnMut(&LogChannel) -> Option<Route>,
+    mut take: impl FnMut(&mut Vec<Item>, bool) -> std::result::Result<ControlFlow<()>, E>,
+) -> std::result::Result<Vec<LogChannel>, E> {
+    let format = lines.format();
+    let is_judged = are_judged(&lines, options);
+    let mut met = TextChannels::of(&lines, options);
+    let mut out = RoutedItems::default();
+    let (mut has_rates, mut is_enough) = (false, false);
+    let of_line = |event: LineEvent<'_, R>| -> std::result::Result<_, E> {
+        match &event {
+            LineEvent::Met(key, line, samples) => {
+                met.meet(key, line);
+                let known = met.newest(samples);
+                let stated = known.as_ref().and_then(|known| known.stated.as_ref());
+                has_rates |= stated.is_some_and(|stated| stated.has_gyro);
+                out.routes.push(known.as_ref().and_then(&mut select));
             }
+            LineEvent::Samples(place, samples) => met.take(*place, samples),
+            LineEvent::LineOver(lines, sensors) => {
+                if lines.number() > PATIENCE && !has_rates {
+                    return Err(no_rates(path, format, "").into());
+                }
+                if is_judged && out.steps(sensors) == STEPS {
+                    sensors.check_nanos(path, format)?;
+                }
+                let may_wait = lines.may_wait();
+                if may_wait || out.items.len() >= BATCH {
+                    let flow = take(&mut out.items, may_wait)?;
+                    is_enough = flow.is_break();
+                    return Ok(flow);
+                }
+            }
+            LineEvent::Undecodable(..) => {}
+        }
+        out.add(event);
+        Ok(ControlFlow::Continue(()))
+    };
+    let sensors = read(&mut lines, path, of_line)?;
+    if !has_rates {
+        return Err(no_rates(path, format, "").into());
+    }
+    if is_judged && out.steps(&sensors) < STEPS {
+        sensors.check_nanos(path, format)?;
+    }
+    if !is_enough {
+        let _ = take(&mut out.items, false)?;
+    }
+    Ok(met.channels())
+}
+
+/// Why the unit of the rates may be another one than it is taken for.
+#[must_use]
+pub fn doubt_of_unit(lines: &Lines<impl Read>) -> Option<String> {
+    lines.table().and_then(Table::doubt_of_unit)
+}
+
+/// The ways of channels, and what went along them.
+#[derive(Default)]
+struct RoutedItems {
+    routes: Vec<Option<Route>>,
+    items: Vec<Item>,
+}
+
+impl RoutedItems {
+    fn add(&mut self, event: LineEvent<'_, impl Read>) {
+        let of = |place: usize| self.routes.get(place).and_then(Option::as_ref);
+        match event {
+            LineEvent::Samples(place, samples) => {
+                if let Some(route) = of(place) {
+                    route.pass(samples, &mut self.items);
+                }
+            }
+            LineEvent::Undecodable(place, number, why) => {
+                if let Some(route) = of(place) {
+                    route.lose(number, why, &mut self.items);
+                }
+            }
+            LineEvent::Met(..) | LineEvent::LineOver(..) => {}
         }
     }
-}
 
-fn spanning(all: Option<(u64, u64)>, (first, last): (u64, u64)) -> (u64, u64) {
-    all.map_or((first, last), |(a, b)| (a.min(first), b.max(last)))
-}
-
-/// The channels with their names: a sensor's own, unless its attitudes stand beside its samples.
-fn named(met: Vec<(Key, Met)>, format: Format) -> Vec<(LogChannel, Option<(u64, u64)>)> {
-    let sampled: BTreeSet<String> = met
-        .iter()
-        .filter(|((_, is_attitude), _)| !is_attitude)
-        .map(|((id, _), _)| id.clone())
-        .collect();
-    let channel = |(index, ((id, is_attitude), met)): (usize, (Key, Met))| {
-        let name = if id.is_empty() { UNNAMED } else { &id };
-        let topic = match is_attitude && sampled.contains(&id) {
-            true => format!("{name}/attitude"),
-            false => name.to_owned(),
-        };
-        let number = u16::try_from(index).unwrap_or(u16::MAX);
-        let is_truth = is_attitude && id == TRUTH_ID;
-        let schema = Schema {
-            id: number.saturating_add(1),
-            name: match (format, is_attitude) {
-                (format, false) if format.is_table() => "samples".to_owned(),
-                (format, true) if format.is_table() => "attitudes".to_owned(),
-                _ if met.class.is_empty() => "samples".to_owned(),
-                _ => met.class,
-            },
-            encoding: String::new(),
-            data: Vec::new(),
-        };
-        let known = LogChannel {
-            channel: Arc::new(Channel {
-                index,
-                id: number,
-                topic,
-                message_encoding: format.name().to_owned(),
-                metadata: BTreeMap::new(),
-                schema_id: schema.id,
-                schema: Some(Arc::new(schema)),
-                text: Some(format),
-            }),
-            messages: met.messages,
-            first: None,
-            openings: Vec::new(),
-            // The rate behind an attitude is a sample where there is nothing else; the truth about samples is none.
-            role: Role {
-                has_rate: met.stated.has_gyro && !is_truth,
-                has_orientation: met.stated.has_orientation,
-                rank: if is_attitude { Rank::Weak } else { Rank::Imu },
-            },
-            stated: Some(met.stated),
-        };
-        (known, met.times)
-    };
-    met.into_iter().enumerate().map(channel).collect()
-}
-
-fn surveyed((known, times): &(LogChannel, Option<(u64, u64)>)) -> ChannelSurvey {
-    ChannelSurvey {
-        channel: known.channel.clone(),
-        messages: known.messages,
-        times: *times,
-        bytes: None,
+    /// Steps between the stamps of the first channel that has a way.
+    fn steps(&self, sensors: &Sensors) -> u64 {
+        let first = self.routes.iter().position(Option::is_some);
+        let bare = first.and_then(|place| sensors.bare.get(place));
+        bare.map_or(0, BareStamps::steps)
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Candidate {
     pub messages: Option<u64>,
     /// Likelihood that this is "the IMU": 0 = carries no rate, 1 = could be told to, higher = better.
     pub rank: u8,
+    /// Whether these are attitudes of a sensor whose samples are another topic: no other sensor.
+    pub is_derived: bool,
 }
 
 /// A rank from which a topic is picked without being named.
@@ -102,10 +104,12 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
                     topics: listing(&these),
                 });
             }
-            let others: Vec<String> = imus(PICKED_UNNAMED)
-                .into_iter()
-                .filter(|t| !topics.contains(t))
-                .collect();
+            let is_own = |name: &String| {
+                let mut all = candidates.iter().filter(|c| c.topic == *name);
+                topics.contains(name) || all.all(|c| c.is_derived)
+            };
+            let mut others = imus(PICKED_UNNAMED);
+            others.retain(|name| !is_own(name));
             let note = (!others.is_empty()).then(|| {
                 format!(
                     "took {}; {} could be taken too with {TOPIC}",
@@ -154,6 +158,7 @@ mod tests {
             described: "t [e]".into(),
             messages: Some(3),
             rank,
+            is_derived: false,
         }
     }
 

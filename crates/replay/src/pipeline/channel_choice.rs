@@ -19,7 +19,7 @@ use strapd_recording::mcap::Channel;
 use strapd_recording::recording::beside::{self, AuxiliaryInputs};
 use strapd_recording::recording::channel_route::{Noticed, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
-use strapd_recording::recording::log_channel::{LogChannel, described, rank};
+use strapd_recording::recording::log_channel::{LogChannel, rank};
 use strapd_recording::recording::sources::{Publisher, is_same};
 use strapd_recording::recording::topic_plan::{self, TopicPlan};
 use strapd_recording::recording::topics;
@@ -82,7 +82,7 @@ fn choose_one<'l>(
     let found = TopicInfo {
         name: name.to_owned(),
         output_topic: topic,
-        described: described(&first.channel),
+        described: first.read_as(),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),
         noticed: Arc::new(Noticed::of(&plan.source)),
         warnings: plan

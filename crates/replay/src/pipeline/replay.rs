@@ -9,7 +9,7 @@ use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
 use super::session_builder::begin;
 use super::summarise;
-use super::{lines, logged, replay_stream};
+use super::{logged, replay_stream};
 use crate::error::{Error, Result};
 use crate::sink::Flow;
 use crate::summary::{RunSummary, human_bytes};
@@ -48,13 +48,7 @@ pub fn run(
                 Source::Elsewhere(address) => logged::elsewhere(address)?,
                 source => logged::open(&source.name())?,
             };
-            // Of lines and rows who speaks is known when all are read, which only several sensors are worth.
-            let is_of_all = run.selection.topic.as_deref() == Some("all");
-            let is_whole = input.format().is_text() && input.parts().is_empty();
-            match is_whole {
-                true => whole_text(run, &input, is_of_all, pool, watch)?,
-                false => file(run, &input, pool, watch)?,
-            }
+            file(run, &input, pool, watch)?
         }
         Source::Parts(paths) => file(run, &logged::joined(paths)?, pool, watch)?,
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
@@ -78,28 +72,9 @@ fn piped(
     }
     match incoming(&name, input, &run.selection.decode, &logged::warn())? {
         Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
-        Incoming::Lines(text) => lines::replay(run, *text, None, pool, watch),
-        Incoming::Whole(input) if input.format().is_text() => {
-            whole_text(run, &input, false, pool, watch)
-        }
+        Incoming::Lines(lines) => replay_stream::replay_lines(run, *lines, pool, watch),
         Incoming::Whole(input) => file(run, &input, pool, watch),
     }
-}
-
-/// Lines or rows that can be read again.
-fn whole_text(
-    run: &ReplayRequest,
-    input: &Input,
-    is_of_all: bool,
-    pool: &Pool,
-    watch: &mut dyn FnMut(&Position),
-) -> Result<RunSummary> {
-    if is_of_all {
-        return file(run, input, pool, watch);
-    }
-    let text = || input.lines(&run.selection.decode);
-    let prepared = lines::prepare(run, text()?, pool)?;
-    lines::replay(run, text()?, prepared, pool, watch)
 }
 
 /// Warning for attitudes made before that are taken for a recording.
@@ -117,13 +92,9 @@ fn file(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let path = input.name();
-    let log = Recording::told_apart(
-        input,
-        run.selection.topic.as_deref(),
-        &run.selection.decode,
-        pool,
-    )?;
-    let choice = log.choose(path, run.selection.topic.as_deref())?;
+    let (named, options) = (run.selection.topic.as_deref(), run.decode_options());
+    let log = Recording::told_apart_with_notes(input, named, &options, pool)?;
+    let choice = log.choose(path, named)?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note.into());
@@ -132,6 +103,11 @@ fn file(
         (log.made_before(), &run.selection.topic, chosen.first_mut())
     {
         first.found.warnings.push(integrated_again(&made));
+    }
+    if let Some(first) = chosen.first_mut() {
+        let notes = log.notes(run.plan.unit.is_some());
+        let notes = notes.cloned().map(Diagnostic::from);
+        first.found.warnings.extend(notes);
     }
     let reference = reference(run, path, &log, &chosen, false)?;
     let besides = besides(run, path, &log, &mut chosen)?;

@@ -5,8 +5,10 @@ use crate::error;
 use crate::sink::{self, Target};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
+use strapd_recording::decode::Options;
 use strapd_recording::{Error, Selection, Source};
 
 /// A replay to be done.
@@ -55,6 +57,14 @@ impl ReplayRequest {
             against: None,
             command: String::new(),
             record_paths: false,
+        }
+    }
+
+    /// Options by which samples are read: under another clock than their own nobody needs their stamps.
+    pub(super) fn decode_options(&self) -> Options {
+        Options {
+            are_stamps_unread: self.plan.clock != Clock::Header,
+            ..self.selection.decode.clone()
         }
     }
 
