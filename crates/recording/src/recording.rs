@@ -15,9 +15,9 @@
 //! | file | |
 //! |---|---|
 //! | [`input`], `folder`, `line_input`, [`incoming`] | what can be read again, the recording in a folder, lines and rows, what comes once |
-//! | [`opened`], [`text_log`], `text_channels`, [`log_channel`], [`payload_type`], [`sources`] | what is in a log, or in a text; the channels of a text; what a channel can serve as; the type of its payloads; who speaks on a topic |
+//! | [`opened`], `first_messages`, [`text_log`], `text_channels`, [`log_channel`], [`payload_type`], [`sources`], `turns` | what is in a log, or in a text; the channels of a text; what a channel can serve as; the type of its payloads; who speaks on a topic |
 //! | `line_reader`, `sample_cache` | the samples of lines, sensor by sensor; those of a text, kept for the next walk |
-//! | [`selection`], [`topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
+//! | [`selection`], [`topics`], [`log_topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
 //! | `samples`, [`topic_plan`], [`topic_reading`] | how a topic is read, and which messages are its own; all samples that are selected, one topic |
 //! | [`made_before`] | whether it is none, but what strapd made of one |
@@ -28,6 +28,7 @@ pub mod beside;
 pub mod channel_route;
 pub mod decoders;
 pub mod early_besides;
+mod first_messages;
 mod folder;
 pub mod held;
 pub mod incoming;
@@ -35,6 +36,7 @@ pub mod input;
 mod line_input;
 mod line_reader;
 pub mod log_channel;
+pub mod log_topics;
 pub mod made_before;
 pub mod opened;
 mod parts;
@@ -50,4 +52,5 @@ pub mod text_log;
 pub mod topic_plan;
 pub mod topic_reading;
 pub mod topics;
+mod turns;
 pub mod warn;

@@ -1,7 +1,8 @@
 //! Route of the messages of one channel, on the workers. Pure.
 
 use super::log_channel::nanos;
-use super::sources::{Publisher, Turns, digest};
+use super::sources::Publisher;
+use super::turns::{Turns, digest};
 use crate::decode::{Decoder, Undecodable};
 use crate::mcap::{Channel, Message};
 use std::cell::RefCell;

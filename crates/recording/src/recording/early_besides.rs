@@ -10,10 +10,13 @@ use strapd_attitude::record::RawSample;
 /// force.
 pub const MOST: usize = 16;
 
+/// A line, and its samples.
+pub(super) type Early = (Line, Vec<RawSample>);
+
 /// Lines that wait for the first rate of their sensor.
 #[derive(Debug, Default)]
 pub(super) struct EarlyBesides {
-    held: VecDeque<(Line, Vec<RawSample>)>,
+    held: VecDeque<Early>,
 }
 
 impl EarlyBesides {
@@ -24,11 +27,14 @@ impl EarlyBesides {
         self.held.push_back((line, std::mem::take(samples)));
     }
 
-    /// Releases those of the sensor of this name, and those that name none.
-    pub(super) fn release(&mut self, id: &str) -> Vec<(Line, Vec<RawSample>)> {
+    /// Releases those of a sensor, and those that name none; its attitudes have none.
+    pub(super) fn of(&mut self, (id, is_attitude): &(String, bool)) -> Vec<Early> {
+        if *is_attitude {
+            return Vec::new();
+        }
         let (own, others) = std::mem::take(&mut self.held)
             .into_iter()
-            .partition(|(line, _)| line.id.as_deref().is_none_or(|of| of == id));
+            .partition(|(line, _)| line.id.as_deref().is_none_or(|of| of == *id));
         self.held = others;
         Vec::from(own)
     }

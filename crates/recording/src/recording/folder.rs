@@ -89,38 +89,34 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
             format: *format,
             parts: Vec::new(),
         }),
-        [] => Err(match known {
-            Some(why) => why,
-            None => unsupported(
-                Diagnostic::new(format!(
-                    "a folder without a recording that is read: {}",
-                    named(&files)
-                ))
-                .help("name a file"),
-            ),
-        }),
-        several => {
-            if let Some(format) = split_by_rosbag2(path, several) {
-                return Ok(Folder {
-                    main: path.to_owned(),
-                    format,
-                    beside: Vec::new(),
-                    parts: several.iter().map(|(file, _)| file.clone()).collect(),
-                });
-            }
-            let names: Vec<PathBuf> = several.iter().map(|(file, _)| file.clone()).collect();
-            Err(unsupported(
-                Diagnostic::new(format!(
-                    "a folder of {} recordings: {}",
-                    names.len(),
-                    named(&names)
-                ))
-                .help(format!(
-                    "name one of them; {JOIN} makes one of the files of a recording"
-                )),
-            ))
+        [] => {
+            let what = format!(
+                "a folder without a recording that is read: {}",
+                named(&files)
+            );
+            Err(known.unwrap_or_else(|| unsupported(Diagnostic::new(what).help("name a file"))))
         }
+        several => of_several(path, several),
     }
+}
+
+/// A folder of several recordings, which is one where a single recorder split it.
+fn of_several(path: &Path, several: &[(PathBuf, Format)]) -> Result<Folder> {
+    let files = several.iter().map(|(file, _)| file.clone());
+    let files: Vec<PathBuf> = files.collect();
+    if let Some(format) = split_by_rosbag2(path, several) {
+        return Ok(Folder {
+            main: path.to_owned(),
+            format,
+            beside: Vec::new(),
+            parts: files,
+        });
+    }
+    let what = format!("a folder of {} recordings: {}", files.len(), named(&files));
+    let what = Diagnostic::new(what).help(format!(
+        "name one of them; {JOIN} makes one of the files of a recording"
+    ));
+    Err(Error::unsupported(path, what))
 }
 
 impl Tables {

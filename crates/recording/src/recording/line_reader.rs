@@ -4,7 +4,7 @@
 //! alike: with lines that are none, with forces that come before their gyro, with stamps whose unit is not known yet.
 
 use super::bare_stamps::BareStamps;
-use super::early_besides::{EarlyBesides, are_beside};
+use super::early_besides::{Early, EarlyBesides, are_beside};
 use super::line_input::{is_sure, no_samples, unclear};
 use crate::decode::{Class, Line, Undecodable};
 use crate::error::Error;
@@ -62,6 +62,37 @@ impl Sensors {
             Some(found) => Err(Error::unsupported(path, found.in_file(format.is_table()))),
             None => Ok(()),
         }
+    }
+
+    /// Adds a sensor that is new, with the lines beside its samples that came before it. Their samples whose stamps are
+    /// known.
+    fn add(&mut self, key: Key, early: Vec<Early>, path: &Path) -> Result<Vec<RawSample>, Error> {
+        let (mut bare, mut known) = (BareStamps::default(), Vec::new());
+        for (line, mut samples) in early {
+            stamped(&mut bare, &mut samples, &line, path, &mut known)?;
+        }
+        self.places.insert(key, self.bare.len());
+        self.bare.push(bare);
+        Ok(known)
+    }
+
+    /// Hands over the samples that still wait at the end.
+    fn settle<R, E: From<Error>>(
+        &mut self,
+        path: &Path,
+        mut take: impl FnMut(LineEvent<'_, R>) -> Result<ControlFlow<()>, E>,
+    ) -> Result<(), E> {
+        for place in self.places.values() {
+            let Some(bare) = self.bare.get_mut(*place) else {
+                continue;
+            };
+            let last = bare.settle().map_err(|what| unclear(path, &what))?;
+            let last: Vec<RawSample> = last.collect();
+            if !last.is_empty() && take(LineEvent::Samples(*place, &last))?.is_break() {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Returns the stamps of the sensor of this place that a line belongs to beside its samples.
@@ -131,17 +162,8 @@ pub(super) fn read<R: Read, E: From<Error>>(
                         if take(LineEvent::Met(&key, &line, &samples))?.is_break() {
                             return Ok(sensors);
                         }
-                        let mut bare = BareStamps::default();
-                        let (id, is_attitude) = &key;
-                        let early_ones = match is_attitude {
-                            true => Vec::new(),
-                            false => early_besides.release(id),
-                        };
-                        for (line, mut samples) in early_ones {
-                            stamped(&mut bare, &mut samples, &line, path, &mut known)?;
-                        }
-                        sensors.bare.push(bare);
-                        sensors.places.insert(key.clone(), place);
+                        let early = early_besides.of(&key);
+                        known.extend(sensors.add(key.clone(), early, path)?);
                     }
                     before = Some(place);
                     rated = if key.1 { rated } else { before };
@@ -172,16 +194,7 @@ pub(super) fn read<R: Read, E: From<Error>>(
     if let Some(why) = first_bad.filter(|_| before.is_none()) {
         return Err(why.into());
     }
-    for place in sensors.places.values() {
-        let Some(bare) = sensors.bare.get_mut(*place) else {
-            continue;
-        };
-        let last = bare.settle().map_err(|what| unclear(path, &what))?;
-        let last: Vec<RawSample> = last.collect();
-        if !last.is_empty() && take(LineEvent::Samples(*place, &last))?.is_break() {
-            break;
-        }
-    }
+    sensors.settle(path, take)?;
     Ok(sensors)
 }
 

@@ -5,27 +5,24 @@
 
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
+use super::first_messages::first_messages;
 use super::input::Input;
-use super::line_input::{no_rates, only_for_tables};
-use super::log_channel::{LogChannel, described, known, nanos, rank};
+use super::line_input::only_for_tables;
+use super::log_channel::{LogChannel, known};
 use super::made_before::{self, MadeBefore};
 use super::parts::{self, Same, Whole};
 use super::sample_cache;
 use super::sources::{self, Known, Publisher};
 use super::text_log::TextLog;
-use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
-use crate::decode::{Options, Unsupported};
+use crate::decode::Options;
 use crate::error::{Error, Result};
 use crate::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use crate::pool::Pool;
-use crate::text::printable;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 
 /// A recording, surveyed.
@@ -244,65 +241,10 @@ impl Recording {
         }
     }
 
-    /// The source of this name. `TOPIC@FRAME` is one even if nobody named that frame so far.
-    #[must_use]
-    pub fn source(&self, name: &str) -> Option<Publisher> {
-        if let Some(known) = self.sources.iter().find(|s| s.name == name) {
-            return Some(known.clone());
-        }
-        let (whole, frame) = sources::by_topic(&self.channels)
-            .into_iter()
-            .find_map(|s| Some((s.clone(), name.strip_prefix(&s.topic)?.strip_prefix('@')?)))?;
-        Some(Publisher {
-            name: name.to_owned(),
-            frame: Some(frame.to_owned()),
-            label: frame.to_owned(),
-            others: self
-                .sources
-                .iter()
-                .filter(|s| s.topic == whole.topic)
-                .filter_map(|s| s.frame.clone())
-                .collect(),
-            ..whole
-        })
-    }
-
-    /// Whether `--topic` of this name can be meant: a topic, or one of several sources on it.
-    #[must_use]
-    pub fn has(&self, name: &str) -> bool {
-        self.channels.iter().any(|k| k.channel.topic == name) || self.source(name).is_some()
-    }
-
     /// The channels of a source.
     pub fn channels_of<'l>(&'l self, source: &Publisher) -> impl Iterator<Item = &'l LogChannel> {
         let indices = source.channels.clone();
         indices.into_iter().filter_map(|n| self.channels.get(n))
-    }
-
-    /// The topics to estimate from ([`topics::choose`]). Where there are none, the error also says
-    /// what is wrong with those that sound like an IMU, and with the file.
-    ///
-    /// # Errors
-    /// As [`topics::choose`].
-    pub fn choose(&self, path: &Path, named: Option<&str>) -> Result<Choice> {
-        if let Some(name) = named.filter(|name| *name != "all") {
-            let mut rivals = self.candidates();
-            rivals.retain(|c| c.topic != name && c.of == name);
-            if !rivals.is_empty() {
-                return Err(Error::SeveralImuTopics {
-                    path: path.to_owned(),
-                    topics: topics::listing(&rivals),
-                });
-            }
-            if self.source(name).is_some() {
-                return Ok(Choice {
-                    topics: vec![name.to_owned()],
-                    note: None,
-                });
-            }
-        }
-        topics::choose(path, &self.candidates(), named)
-            .map_err(|error| explained(error, &self.channels, &self.problems))
     }
 
     /// Whether there is nothing in it but attitudes that strapd made before.
@@ -435,193 +377,12 @@ impl Recording {
         let report = mcap::walk(reader, &options, select, Route::map, take)?;
         Ok(report.survey)
     }
-
-    /// Candidates for the choice of topics: one for each source.
-    #[must_use]
-    pub fn candidates(&self) -> Vec<Candidate> {
-        let provenance = self.survey.facts.provenance.iter();
-        let outputs: BTreeSet<&str> = provenance
-            .filter(|(key, _)| *key == "output_topic" || key.ends_with(" output_topic"))
-            .map(|(_, topic)| topic.as_str())
-            .collect();
-        let inputs: BTreeSet<&str> = self
-            .channels
-            .iter()
-            .filter(|k| k.role.has_rate)
-            .filter_map(|k| k.channel.topic.strip_suffix("/data_raw"))
-            .collect();
-        // What a run put out, by its metadata or by its name beside the input's: its rates are another
-        // channel's, less the bias.
-        let is_our_attitude = |known: &LogChannel| {
-            let topic = known.channel.topic.as_str();
-            known.channel.metadata.contains_key("rotates")
-                || outputs.contains(topic)
-                || topic
-                    .strip_suffix("/data")
-                    .is_some_and(|name| inputs.contains(name))
-        };
-        let rank_of = |known: &LogChannel| match known.rank() {
-            best if is_our_attitude(known) => best.min(PICKED_UNNAMED),
-            best => best,
-        };
-        let mut users: BTreeMap<usize, usize> = BTreeMap::new();
-        for channel in self.sources.iter().flat_map(|s| &s.channels) {
-            *users.entry(*channel).or_default() += 1;
-        }
-        let is_shared = |channel: &usize| users.get(channel).is_some_and(|n| *n > 1);
-        self.sources
-            .iter()
-            .map(|s| self.candidate(s, s.channels.iter().any(is_shared), &rank_of))
-            .collect()
-    }
-
-    /// `is_shared`: another source has messages on its channels.
-    fn candidate(
-        &self,
-        source: &Publisher,
-        is_shared: bool,
-        rank_of: &dyn Fn(&LogChannel) -> u8,
-    ) -> Candidate {
-        let first = self.channels_of(source).next();
-        let mut said = first.map_or_else(String::new, |k| described(&k.channel).to_string());
-        if !source.label.is_empty() {
-            let publishers = first.map_or_else(String::new, |k| sources::publisher(&k.channel));
-            for (what, name) in [
-                ("frame", source.frame.as_deref().unwrap_or_default()),
-                ("publisher", publishers.as_str()),
-            ] {
-                if !name.is_empty() {
-                    said.push_str(&format!("  {what} {name}"));
-                }
-            }
-        }
-        Candidate {
-            topic: source.name.clone(),
-            of: source.topic.clone(),
-            described: said,
-            // How many of a channel's messages are whose is known at the end.
-            messages: (!is_shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
-            rank: self.channels_of(source).map(rank_of).max().unwrap_or(0),
-            is_derived: first.is_some_and(|known| known.is_derived),
-        }
-    }
-}
-
-/// "No IMU topic" with what is wrong with those that sound like one, and with the file.
-#[must_use]
-pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> Error {
-    let Error::NoImuTopic {
-        path, mut topics, ..
-    } = error
-    else {
-        return error;
-    };
-    if let Some(format) = channels.iter().find_map(|known| known.channel.text) {
-        return no_rates(&path, format, "");
-    }
-    let sounds_like_one = |k: &&LogChannel| {
-        let name = k.channel.schema.as_deref().map_or("", |s| &s.name);
-        !k.role.has_rate && name.to_ascii_lowercase().contains("imu")
-    };
-    let is_empty = |k: &&LogChannel| k.messages == 0 && rank(&k.role) >= PICKED_UNNAMED;
-    for empty in channels.iter().filter(is_empty).take(SAID) {
-        topics.push_str(&format!(
-            "\n  {} is of an IMU and has no message",
-            printable(&empty.channel.topic)
-        ));
-    }
-    let mut decoders = Decoders::default();
-    let refusals = channels
-        .iter()
-        .filter(sounds_like_one)
-        .filter_map(|k| k.decoder(&mut decoders).err())
-        .map(|why| Diagnostic::from(&why));
-    for why in refusals.take(SAID) {
-        // Its own help is about naming a field; so is the error's.
-        topics.push_str(&format!("\n  {}", why.what()));
-    }
-    for problem in problems.iter().take(SAID) {
-        topics.push_str(&format!("\n  the file is damaged: {problem}"));
-    }
-    let undefined = channels
-        .iter()
-        .filter(|k| k.messages > 0)
-        .filter_map(|k| k.decoder(&mut decoders).err())
-        .find(Unsupported::is_undefined)
-        .map(|why| why.type_name);
-    Error::NoImuTopic {
-        path,
-        topics,
-        undefined,
-    }
 }
 
 /// Bytes on their way at once through a walk to the end.
 pub const AHEAD: usize = WalkOptions::IN_FLIGHT;
 /// The same for a walk that usually ends at once.
 pub const A_LITTLE_AHEAD: usize = 4 << 20;
-
-/// Largest first message that is kept, and all of them together: an IMU's is small, and a log may
-/// have thousands of channels of images.
-const FIRST_LIMIT: usize = 64 << 10;
-const FIRSTS_LIMIT: usize = 16 << 20;
-
-/// Most refusals, and most faults of the file, that an error goes into.
-const SAID: usize = 3;
-
-struct First {
-    id: u16,
-    topic: String,
-    log: Nanos,
-    data: Vec<u8>,
-}
-
-/// The first message of every channel, in file order, reading no further than needed; and what was
-/// wrong with the file up to there.
-fn first_messages(reader: Reader, survey: &Survey) -> Result<(Vec<First>, Vec<String>)> {
-    let wanted = survey.channels.iter().filter(|c| c.messages > 0).count();
-    let mut firsts: Vec<First> = Vec::new();
-    let (mut met, mut bytes) = (0, 0);
-    // On the calling thread: "first" must not depend on who was faster.
-    let report = mcap::walk(
-        reader,
-        // One item a channel: waiting for a batch of them would read the whole log.
-        &WalkOptions {
-            batch: 1,
-            only_firsts: true,
-            ..WalkOptions::default()
-        },
-        |_| Some(AtomicBool::new(false)),
-        |seen, message, out: &mut Vec<First>| {
-            if !seen.swap(true, Ordering::Relaxed) {
-                out.push(First {
-                    id: message.channel.id,
-                    topic: message.channel.topic.clone(),
-                    log: nanos(message.log_time),
-                    data: message
-                        .data
-                        .get(..FIRST_LIMIT.min(message.data.len()))
-                        .map_or_else(Vec::new, <[u8]>::to_vec),
-                });
-            }
-        },
-        |items| {
-            for first in items.drain(..) {
-                met += 1;
-                bytes += first.data.len();
-                if first.data.len() < FIRST_LIMIT && bytes < FIRSTS_LIMIT {
-                    firsts.push(first);
-                }
-            }
-            if met >= wanted {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        },
-    )?;
-    Ok((firsts, problems(&report.survey)))
-}
 
 /// Most of a file's problems that are written out.
 const PROBLEMS_SAID: usize = 5;

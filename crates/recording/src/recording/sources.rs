@@ -8,13 +8,13 @@
 use super::decoders::Decoders;
 use super::log_channel::{LogChannel, nanos, rank};
 use super::topics::PICKED_UNNAMED;
+use super::turns::{Turns, digest};
 use crate::decode::{Decoder, Options};
 use crate::error::Result;
 use crate::mcap::{self, Channel, Reader, WalkOptions};
 use crate::pool::Pool;
 use crate::text::printable;
-use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::record::Nanos;
@@ -84,6 +84,98 @@ const FEW: u64 = 3;
 /// Map from a channel met in one of the recording's files to the recording's own.
 pub(super) type Known<'k> = Box<dyn Fn(&Arc<Channel>) -> Arc<Channel> + 'k>;
 
+/// Channels whose messages are looked at, and what came of it so far.
+#[derive(Default)]
+struct Look {
+    looked: Vec<Looked>,
+    /// Speakers on a topic, by its place among the sources.
+    speakers: BTreeMap<usize, Speakers>,
+    /// Messages that are still to come until enough is known of who speaks, and of the unit of stamps.
+    missing: u64,
+    unsettled: u64,
+    /// Messages of each channel, and of all.
+    counts: HashMap<usize, u64>,
+    total: u64,
+}
+
+impl Look {
+    /// Decides which channels are looked at.
+    fn at(
+        sources: &[Publisher],
+        channels: &[LogChannel],
+        named: Option<&str>,
+        options: &Options,
+    ) -> Look {
+        let mut decoders = Decoders::new(options);
+        let mut look = Look::default();
+        for (place, source, standing) in in_turn(sources, named) {
+            let speaking: Vec<(usize, &LogChannel)> = source
+                .channels
+                .iter()
+                .filter_map(|index| Some((*index, channels.get(*index)?)))
+                .filter(|(_, k)| k.messages > 0 && standing.is_of(k))
+                .collect();
+            let several = speaking.len() > 1 && standing != Standing::Shown;
+            for (index, known) in speaking {
+                if look.looked.len() >= MOST_CHANNELS {
+                    break;
+                }
+                let Ok(decoder) = known.decoder(&mut decoders) else {
+                    continue;
+                };
+                let is_bare = decoder.has_bare_stamps();
+                let is_opened = is_bare || decoder.stamps().len() > 1;
+                let speaks = standing != Standing::Shown && (several || decoder.names_frames());
+                if !speaks && !is_opened {
+                    continue;
+                }
+                if standing != Standing::Shown {
+                    look.missing += known.messages.min(FIRST);
+                    look.speakers
+                        .entry(place)
+                        .or_insert_with(|| Speakers::new(several))
+                        .add(index, &known.channel);
+                }
+                if is_bare {
+                    look.unsettled += known.messages.min(OPENINGS as u64);
+                }
+                look.looked.push(Looked {
+                    channel: known.channel.clone(),
+                    index,
+                    decoder,
+                    is_opened,
+                    is_bare,
+                });
+            }
+        }
+        look
+    }
+
+    /// Takes a message of a topic of this place among the sources.
+    fn take(&mut self, mut met: Met, place: Option<usize>, channels: &mut [LogChannel]) {
+        if let Some(opening) = met.opening.take()
+            && let Some(known) = channels.get_mut(met.channel)
+        {
+            keep(&mut known.openings, opening);
+        }
+        let count = self.counts.entry(met.channel).or_default();
+        *count += 1;
+        self.total += 1;
+        self.missing = self.missing.saturating_sub(u64::from(*count <= FIRST));
+        let settles = met.is_bare && *count <= OPENINGS as u64;
+        self.unsettled = self.unsettled.saturating_sub(u64::from(settles));
+        if let Some(speakers) = place.and_then(|place| self.speakers.get_mut(&place)) {
+            speakers.take(met);
+        }
+    }
+
+    /// Whether more messages would tell no more.
+    fn is_enough(&self) -> bool {
+        let to_the_end = self.speakers.values().any(|s| s.several);
+        !to_the_end && self.unsettled == 0 && (self.missing == 0 || self.total >= ENOUGH)
+    }
+}
+
 /// Publishers on each topic, from the messages; `named` is looked at though it may carry no rate that is
 /// found without [`Options`].
 ///
@@ -97,51 +189,8 @@ pub(super) fn tell_apart(
     pool: &Pool,
 ) -> Result<Vec<Publisher>> {
     let sources = by_topic(channels);
-    let mut decoders = Decoders::new(options);
-    let mut looked: Vec<Looked> = Vec::new();
-    let mut speakers: BTreeMap<usize, Speakers> = BTreeMap::new();
-    let (mut missing, mut unsettled) = (0, 0);
-    for (place, source, standing) in in_turn(&sources, named) {
-        let speaking: Vec<(usize, &LogChannel)> = source
-            .channels
-            .iter()
-            .filter_map(|index| Some((*index, channels.get(*index)?)))
-            .filter(|(_, k)| k.messages > 0 && standing.is_of(k))
-            .collect();
-        let several = speaking.len() > 1 && standing != Standing::Shown;
-        for (index, known) in speaking {
-            if looked.len() >= MOST_CHANNELS {
-                break;
-            }
-            let Ok(decoder) = known.decoder(&mut decoders) else {
-                continue;
-            };
-            let is_bare = decoder.has_bare_stamps();
-            let is_opened = is_bare || decoder.stamps().len() > 1;
-            let speaks = standing != Standing::Shown && (several || decoder.names_frames());
-            if !speaks && !is_opened {
-                continue;
-            }
-            if standing != Standing::Shown {
-                missing += known.messages.min(FIRST);
-                speakers
-                    .entry(place)
-                    .or_insert_with(|| Speakers::new(several))
-                    .add(index, &known.channel);
-            }
-            if is_bare {
-                unsettled += known.messages.min(OPENINGS as u64);
-            }
-            looked.push(Looked {
-                channel: known.channel.clone(),
-                index,
-                decoder,
-                is_opened,
-                is_bare,
-            });
-        }
-    }
-    if looked.is_empty() {
+    let mut look = Look::at(&sources, channels, named, options);
+    if look.looked.is_empty() {
         return Ok(sources);
     }
     let place_of: HashMap<usize, usize> = sources
@@ -149,8 +198,7 @@ pub(super) fn tell_apart(
         .enumerate()
         .flat_map(|(place, s)| s.channels.iter().map(move |index| (*index, place)))
         .collect();
-    let to_the_end = speakers.values().any(|s| s.several);
-    let (mut counts, mut total) = (HashMap::<usize, u64>::new(), 0);
+    let looked = std::mem::take(&mut look.looked);
     let mut is_enough = false;
     for (reader, known) in readers {
         if is_enough {
@@ -179,36 +227,21 @@ pub(super) fn tell_apart(
                 });
             },
             |items| {
-                for mut met in items.drain(..) {
-                    if let Some(opening) = met.opening.take()
-                        && let Some(known) = channels.get_mut(met.channel)
-                    {
-                        keep(&mut known.openings, opening);
-                    }
-                    let count = counts.entry(met.channel).or_default();
-                    *count += 1;
-                    total += 1;
-                    missing = missing.saturating_sub(u64::from(*count <= FIRST));
-                    let settles = met.is_bare && *count <= OPENINGS as u64;
-                    unsettled = unsettled.saturating_sub(u64::from(settles));
-                    if let Some(place) = place_of.get(&met.channel)
-                        && let Some(speakers) = speakers.get_mut(place)
-                    {
-                        speakers.take(met);
-                    }
+                for met in items.drain(..) {
+                    let place = place_of.get(&met.channel).copied();
+                    look.take(met, place, channels);
                 }
-                if !to_the_end && unsettled == 0 && (missing == 0 || total >= ENOUGH) {
-                    is_enough = true;
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
+                is_enough = look.is_enough();
+                match is_enough {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
                 }
             },
         )?;
     }
     let mut told = Vec::new();
     for (place, source) in sources.into_iter().enumerate() {
-        match speakers.remove(&place) {
+        match look.speakers.remove(&place) {
             Some(speakers) => told.append(&mut speakers.sources(&source)),
             None => told.push(source),
         }
@@ -314,13 +347,6 @@ struct Met {
     /// Log time and payload, where first messages are kept.
     opening: Option<(Nanos, Vec<u8>)>,
     is_bare: bool,
-}
-
-/// A payload in a number: the same payload in two channels was recorded twice.
-pub(super) fn digest(payload: &[u8]) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    payload.hash(&mut hasher);
-    hasher.finish()
 }
 
 /// Speakers found on a topic.
@@ -456,51 +482,4 @@ fn labels(
     let differ =
         |labels: &Vec<String>| labels.iter().collect::<BTreeSet<_>>().len() == labels.len();
     kinds.into_iter().find(differ).unwrap_or_default()
-}
-
-/// Recent payloads that are remembered.
-const RECENT: usize = 512;
-/// Returns to a channel that was left which are no second publisher's: messages that overtook each other
-/// where one channel ends and the next begins.
-const MOST_RETURNS: u64 = 2;
-
-/// Whether channels of one topic follow each other, as when a recorder was started again, or take turns.
-#[derive(Debug, Default)]
-pub(super) struct Turns {
-    current: Option<usize>,
-    left: BTreeSet<usize>,
-    returns: u64,
-    echoes: u64,
-    recent: HashMap<u64, usize>,
-    order: VecDeque<u64>,
-}
-
-impl Turns {
-    /// The next message came on `channel`.
-    pub(super) fn take(&mut self, channel: usize, digest: u64) {
-        if self.recent.get(&digest).is_some_and(|of| *of != channel) {
-            // Two recorders wrote what one publisher sent.
-            self.echoes += 1;
-        }
-        if self.recent.insert(digest, channel).is_none() {
-            self.order.push_back(digest);
-        }
-        if self.order.len() > RECENT
-            && let Some(oldest) = self.order.pop_front()
-        {
-            self.recent.remove(&oldest);
-        }
-        if let Some(current) = self.current.filter(|current| *current != channel) {
-            self.left.insert(current);
-            self.returns += u64::from(self.left.contains(&channel));
-        }
-        self.current = Some(channel);
-    }
-
-    /// Whether they are several publishers' channels.
-    #[must_use]
-    pub(super) fn are_several(&self) -> bool {
-        // Each message that is there twice may bring two returns.
-        self.returns > MOST_RETURNS + 2 * self.echoes
-    }
 }

@@ -26,7 +26,7 @@ pub(super) struct TextChannels {
     read_as: PayloadType,
     is_table: bool,
     stated: Stated,
-    /// In the order of appearance.
+    /// Sensors in the order of appearance.
     met: Vec<Met>,
 }
 

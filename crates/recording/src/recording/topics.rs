@@ -49,30 +49,8 @@ pub struct Choice {
 /// [`Error::NoImuTopic`], [`Error::SeveralImuTopics`], [`Error::NoSuchTopic`].
 pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Result<Choice> {
     let best = candidates.iter().map(|c| c.rank).max().unwrap_or(0);
-    let imus = |least: u8| {
-        let mut seen = BTreeSet::new();
-        candidates
-            .iter()
-            .filter(|c| c.rank >= least && seen.insert(c.topic.as_str()))
-            .map(|c| c.topic.clone())
-            .collect::<Vec<String>>()
-    };
     match named {
-        Some("all") if best >= PICKED_UNNAMED => {
-            let topics = imus(PICKED_UNNAMED);
-            if topics.len() > MOST_TOPICS {
-                return Err(Error::Unsupported {
-                    path: path.to_owned(),
-                    what: Diagnostic::new(format!(
-                        "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}",
-                        topics.len(),
-                        named_few(&topics)
-                    ))
-                    .help(format!("{TOPIC} NAME takes one of them")),
-                });
-            }
-            Ok(Choice { topics, note: None })
-        }
+        Some("all") if best >= PICKED_UNNAMED => all(path, candidates),
         Some(topic) if topic != "all" => {
             if candidates.iter().any(|c| c.topic == topic) {
                 return Ok(Choice {
@@ -91,35 +69,62 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
             topics: listing(candidates),
             undefined: None,
         }),
-        _ => {
-            let topics = imus(best);
-            if topics.len() > 1 {
-                let these: Vec<Candidate> = candidates
-                    .iter()
-                    .filter(|c| c.rank == best)
-                    .cloned()
-                    .collect();
-                return Err(Error::SeveralImuTopics {
-                    path: path.to_owned(),
-                    topics: listing(&these),
-                });
-            }
-            let is_own = |name: &String| {
-                let mut all = candidates.iter().filter(|c| c.topic == *name);
-                topics.contains(name) || all.all(|c| c.is_derived)
-            };
-            let mut others = imus(PICKED_UNNAMED);
-            others.retain(|name| !is_own(name));
-            let note = (!others.is_empty()).then(|| {
-                format!(
-                    "took {}; {} could be taken too with {TOPIC}",
-                    named_few(&topics),
-                    named_few(&others)
-                )
-            });
-            Ok(Choice { topics, note })
-        }
+        _ => the_best(path, candidates, best),
     }
+}
+
+/// Topics of at least this rank, each once.
+fn imus(candidates: &[Candidate], least: u8) -> Vec<String> {
+    let mut seen = BTreeSet::new();
+    candidates
+        .iter()
+        .filter(|c| c.rank >= least && seen.insert(c.topic.as_str()))
+        .map(|c| c.topic.clone())
+        .collect()
+}
+
+/// Chooses all topics that carry a rate.
+fn all(path: &Path, candidates: &[Candidate]) -> Result<Choice> {
+    let topics = imus(candidates, PICKED_UNNAMED);
+    if topics.len() > MOST_TOPICS {
+        return Err(Error::Unsupported {
+            path: path.to_owned(),
+            what: Diagnostic::new(format!(
+                "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}",
+                topics.len(),
+                named_few(&topics)
+            ))
+            .help(format!("{TOPIC} NAME takes one of them")),
+        });
+    }
+    Ok(Choice { topics, note: None })
+}
+
+/// Chooses the one topic of the best rank.
+fn the_best(path: &Path, candidates: &[Candidate], best: u8) -> Result<Choice> {
+    let topics = imus(candidates, best);
+    if topics.len() > 1 {
+        let these = candidates.iter().filter(|c| c.rank == best);
+        let these: Vec<Candidate> = these.cloned().collect();
+        return Err(Error::SeveralImuTopics {
+            path: path.to_owned(),
+            topics: listing(&these),
+        });
+    }
+    let is_own = |name: &String| {
+        let mut all = candidates.iter().filter(|c| c.topic == *name);
+        topics.contains(name) || all.all(|c| c.is_derived)
+    };
+    let mut others = imus(candidates, PICKED_UNNAMED);
+    others.retain(|name| !is_own(name));
+    let note = (!others.is_empty()).then(|| {
+        format!(
+            "took {}; {} could be taken too with {TOPIC}",
+            named_few(&topics),
+            named_few(&others)
+        )
+    });
+    Ok(Choice { topics, note })
 }
 
 /// One indented line per channel, at most 40.

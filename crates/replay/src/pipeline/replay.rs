@@ -15,6 +15,7 @@ use crate::sink::Flow;
 use crate::summary::{RunSummary, human_bytes};
 use std::io::Read;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::time::Instant;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
@@ -23,6 +24,7 @@ use strapd_recording::MadeBefore;
 use strapd_recording::Recording;
 use strapd_recording::Source;
 use strapd_recording::format::open;
+use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::AuxiliaryInputs;
 use strapd_recording::recording::channel_route::Item;
@@ -96,18 +98,13 @@ fn file(
     let log = Recording::told_apart_with_notes(input, named, &options, pool)?;
     let choice = log.choose(path, named)?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
-    if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
-        first.found.warnings.push(note.into());
-    }
-    if let (Some(made), None, Some(first)) =
-        (log.made_before(), &run.selection.topic, chosen.first_mut())
-    {
-        first.found.warnings.push(integrated_again(&made));
-    }
     if let Some(first) = chosen.first_mut() {
+        let warnings = &mut first.found.warnings;
+        warnings.extend(choice.note.map(Diagnostic::from));
         let notes = log.notes(run.plan.unit.is_some());
-        let notes = notes.cloned().map(Diagnostic::from);
-        first.found.warnings.extend(notes);
+        warnings.extend(notes.cloned().map(Diagnostic::from));
+        let made_before = log.made_before().filter(|_| named.is_none());
+        warnings.extend(made_before.as_ref().map(integrated_again));
     }
     let reference = reference(run, path, &log, &chosen, false)?;
     let besides = besides(run, path, &log, &mut chosen)?;
@@ -143,6 +140,11 @@ fn file(
             Ok(ControlFlow::Continue(()))
         },
     )?;
+    log_passed_over(path, &survey);
+    Ok(summarise::run(run, session.finish(run, pool)?, &survey))
+}
+
+fn log_passed_over(path: &Path, survey: &Survey) {
     let passed = survey.passed_over;
     if passed.chunks > 0 {
         tracing::info!(
@@ -152,7 +154,6 @@ fn file(
             human_bytes(passed.bytes)
         );
     }
-    Ok(summarise::run(run, session.finish(run, pool)?, &survey))
 }
 
 /// Share of a log of this span that lies before the last of `items`.

@@ -24,7 +24,7 @@ use strapd_recording::recording::channel_route::{Item, Noticed, Route, RouteTarg
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::held::Held;
 use strapd_recording::recording::log_channel::{LogChannel, described, known, rank};
-use strapd_recording::recording::opened::explained;
+use strapd_recording::recording::log_topics::explained;
 use strapd_recording::recording::payload_type::PayloadType;
 use strapd_recording::recording::sources::publisher;
 use strapd_recording::recording::topics::{self, PICKED_UNNAMED};
