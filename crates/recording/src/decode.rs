@@ -4,6 +4,8 @@
 //! broken, makes it panic, loop or allocate beyond a bound. What the bytes say is not judged here;
 //! NaN, zero stamps and absurd rates pass, and conditioning counts them.
 //!
+//! Long because a decoder and how it is compiled are the same parts twice: what one kind of message needs is in an arm of each.
+//!
 //! ```text
 //! schema text or descriptor -> schema (one graph for all languages)
 //!                              -> select (which fields)  -> plan, compiled once per channel

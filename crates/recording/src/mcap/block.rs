@@ -194,6 +194,28 @@ fn room(buf: &mut Vec<u8>, n: usize) -> &mut [u8] {
     buf.get_mut(..n).unwrap_or(&mut [])
 }
 
+/// Reads what lies at a place of a file, its CRC with it if that is wanted.
+fn fetch(
+    file: &LogFile,
+    offset: u64,
+    into: &mut [u8],
+    mut crc: Option<&mut crc32fast::Hasher>,
+) -> io::Result<Result<(), ProblemKind>> {
+    let (need, mut have) = (into.len() as u64, 0);
+    for piece in into.chunks_mut(PIECE) {
+        let n = file.read_at(piece, offset + have)?;
+        have += n as u64;
+        if n < piece.len() {
+            // The file was cut after the walk had seen its length.
+            return Ok(Err(ProblemKind::Truncated { need, have }));
+        }
+        if let Some(crc) = &mut crc {
+            crc.update(piece);
+        }
+    }
+    Ok(Ok(()))
+}
+
 /// The records of a block, or why they cannot be used.
 pub(super) type Opened<'a> = Result<&'a [u8], ProblemKind>;
 
@@ -231,18 +253,9 @@ impl Buffers {
             }
             Payload::At { file, offset, len } => {
                 let raw = room(&mut self.raw, *len);
-                let mut got = 0;
-                for piece in raw.chunks_mut(PIECE) {
-                    let n = file.read_at(piece, *offset + got as u64)?;
-                    got += n;
-                    if n < piece.len() {
-                        // The file was cut after the walk had seen its length.
-                        let (need, have) = (*len as u64, got as u64);
-                        return Ok(Err(ProblemKind::Truncated { need, have }));
-                    }
-                    if plain_crc(&block.kind) {
-                        seen.update(piece);
-                    }
+                let crc = plain_crc(&block.kind).then_some(&mut seen);
+                if let Err(cut) = fetch(file, *offset, raw, crc)? {
+                    return Ok(Err(cut));
                 }
                 raw
             }
@@ -261,45 +274,28 @@ impl Buffers {
         else {
             return Ok(Ok(packed));
         };
-        let plain = match compression {
-            Compression::None if packed.len() == size => packed,
+        let unpacked = match compression {
+            Compression::None if packed.len() == size => Ok(Unpacked::All(size)),
             Compression::None => {
                 let (declared, actual) = (size as u64, packed.len() as u64);
-                return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
+                Err(ProblemKind::ChunkSize { declared, actual })
             }
             // No chunk of an MCAP is packed so.
             Compression::Bzip2 => {
                 let name = compression.name().to_owned();
-                return Ok(Err(ProblemKind::UnknownCompression { name }));
+                Err(ProblemKind::UnknownCompression { name })
             }
             Compression::Lz4 | Compression::Zstd => {
                 let plain = room(&mut self.plain, size);
-                let unpacked = match compression {
-                    Compression::Lz4 => unlz4(packed, plain, crc).map(Unpacked::All),
-                    _ if (1..=size / SUSPECT).contains(&packed.len()) => {
-                        unzstd_records(packed, plain)
-                    }
-                    _ => unzstd(&mut self.zstd, packed, plain).map(Unpacked::All),
-                };
-                match unpacked {
-                    Ok(Unpacked::All(n)) if n == size => {
-                        if packed.len() < size / LEAST_RECORD && are_too_many(plain, packed.len()) {
-                            let why = TOO_MANY.to_owned();
-                            return Ok(Err(ProblemKind::Unpack { why }));
-                        }
-                        plain
-                    }
-                    // What follows the records says itself what it is.
-                    Ok(Unpacked::Records(end)) => {
-                        return Ok(Ok(plain.get(..end).unwrap_or(&[])));
-                    }
-                    Ok(Unpacked::All(n)) => {
-                        let (declared, actual) = (size as u64, n as u64);
-                        return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
-                    }
-                    Err(e) => return Ok(Err(ProblemKind::Unpack { why: e.to_string() })),
-                }
+                unpack(&mut self.zstd, compression, packed, plain, crc)
             }
+        };
+        let plain = match unpacked {
+            Err(problem) => return Ok(Err(problem)),
+            Ok(Unpacked::All(_)) if compression == Compression::None => packed,
+            Ok(Unpacked::All(_)) => self.plain.get(..size).unwrap_or(&[]),
+            // What follows the records says itself what it is.
+            Ok(Unpacked::Records(end)) => return Ok(Ok(self.plain.get(..end).unwrap_or(&[]))),
         };
         if crc != 0 {
             let computed = match compression {
@@ -370,6 +366,36 @@ enum Unpacked {
     All(usize),
     /// Records, up to and with the head of one with opcode 0, which none has.
     Records(usize),
+}
+
+/// Unpacks a chunk that is packed, whose size is that of `plain`.
+fn unpack(
+    context: &mut Option<zstd::bulk::Decompressor<'static>>,
+    compression: Compression,
+    packed: &[u8],
+    plain: &mut [u8],
+    crc: u32,
+) -> Result<Unpacked, ProblemKind> {
+    let size = plain.len();
+    let unpacked = match compression {
+        Compression::Lz4 => unlz4(packed, plain, crc).map(Unpacked::All),
+        _ if (1..=size / SUSPECT).contains(&packed.len()) => unzstd_records(packed, plain),
+        _ => unzstd(context, packed, plain).map(Unpacked::All),
+    };
+    match unpacked {
+        Ok(Unpacked::All(n)) if n != size => {
+            let (declared, actual) = (size as u64, n as u64);
+            Err(ProblemKind::ChunkSize { declared, actual })
+        }
+        Ok(Unpacked::All(_))
+            if packed.len() < size / LEAST_RECORD && are_too_many(plain, packed.len()) =>
+        {
+            let why = TOO_MANY.to_owned();
+            Err(ProblemKind::Unpack { why })
+        }
+        Ok(unpacked) => Ok(unpacked),
+        Err(e) => Err(ProblemKind::Unpack { why: e.to_string() }),
+    }
 }
 
 /// Unpacks piece by piece, and no further than there are records. Of 2 kB of zeros, 64 MiB would be unpacked,

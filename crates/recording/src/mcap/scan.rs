@@ -5,6 +5,7 @@
 //! framing is lost it is found again at the next thing that can only be a chunk.
 
 mod chunk;
+mod facts;
 
 use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
@@ -14,7 +15,7 @@ use super::input::{Held, Input, Tape};
 use super::resync;
 use crate::format::Format;
 use crate::records::problem::{ProblemKind, Problems};
-use crate::records::record::{DataEnd, HeaderRecord, MetadataRecord, Record};
+use crate::records::record::Record;
 use crate::records::{HEAD, MAGIC, head_at, op};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -284,6 +285,15 @@ impl Scanner {
         }
     }
 
+    /// Whether a record without messages is read for what it says.
+    fn is_wanted(&self, opcode: u8, length: u64) -> bool {
+        self.besides == Besides::Everything
+            || match opcode {
+                op::METADATA => length <= METADATA_READ,
+                opcode => matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS),
+            }
+    }
+
     /// Any record that carries no messages.
     fn other(&mut self, at: u64, opcode: u8, length: u64) -> io::Result<Option<Item>> {
         let total = length.saturating_add(HEAD as u64);
@@ -294,13 +304,9 @@ impl Scanner {
             op::FOOTER => self.section = Section::Footer,
             _ => {}
         }
-        let small = opcode == op::METADATA && length <= METADATA_READ;
         let attached = self.besides == Besides::Attached
             && matches!(opcode, op::HEADER | op::ATTACHMENT | op::METADATA);
-        let wanted = small
-            || attached
-            || self.besides == Besides::Everything
-            || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
+        let wanted = attached || self.is_wanted(opcode, length);
         let limit = match opcode {
             op::METADATA if attached => self.limits.record.min(METADATA_COPIED),
             _ => self.limits.record,
@@ -323,37 +329,14 @@ impl Scanner {
         if ahead.len() < all {
             return self.lost(at, total);
         }
-        match ahead
+        if let Some(record) = ahead
             .get(HEAD..all)
             .and_then(|body| Record::parse(opcode, body))
         {
-            Some(Record::Header(HeaderRecord { profile, library }))
-                if self.facts.profile.is_empty() =>
-            {
-                self.facts.profile = profile.to_owned();
-                self.facts.library = library.to_owned();
+            let (facts, claimed) = (&mut self.facts, &mut self.claimed);
+            if let Some(kind) = facts::learn(record, facts, claimed, &mut self.crc) {
+                self.problems.add(at, kind, None);
             }
-            Some(Record::Metadata(MetadataRecord {
-                name: "strapd",
-                metadata,
-            })) if self.facts.provenance.is_empty() => {
-                self.facts.provenance = metadata
-                    .into_iter()
-                    .map(|(key, value)| (key.to_owned(), value.to_owned()))
-                    .collect();
-            }
-            Some(Record::Statistics(s)) => self.claimed = Some(s.message_count),
-            Some(Record::DataEnd(DataEnd {
-                data_section_crc: stored,
-            })) if stored != 0 => {
-                if let Some(computed) = self.crc.take().map(crc32fast::Hasher::finalize)
-                    && computed != stored
-                {
-                    self.problems
-                        .add(at, ProblemKind::DataCrc { stored, computed }, None);
-                }
-            }
-            _ => {}
         }
         if !attached && self.besides != Besides::Everything {
             self.pass_over(total)?;

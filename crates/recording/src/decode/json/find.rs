@@ -1,4 +1,7 @@
 //! One pass over a JSON message, taking what its keys say is wanted. Pure.
+//!
+//! Long because it is one machine: a key decides how its value is read, and every kind of value comes back to the keys
+//! inside it.
 
 use super::Plan;
 use super::found::{Found, Written};

@@ -4,6 +4,8 @@
 //! arrays. What lies beyond (unions, maps, optional members) is kept as undefined: a message is read
 //! up to there.
 //!
+//! Long because it is one grammar, whose rules call each other.
+//!
 //! # Source
 //! OMG IDL 4.2 (formal/18-01-05) 7.4; the concatenation as rosbag2 stores it: a line of `=`, a line
 //! `IDL: pkg/msg/Type`, the text.

@@ -2,6 +2,8 @@
 //!
 //! Breadth first: the shallowest body rate wins, then the better name. The stamp is the one nearest
 //! to it, from the inside out, because a nested message's own header is about its own sample.
+//!
+//! Long because what wins is seen only beside what loses: all searches go over the same sites, by the same measure.
 
 use super::names::{self, Meaning, Px4};
 use super::shapes::{end_of, quaternion, stamp_at, stamp_in, structs_on, text_near, vector, with};

@@ -142,14 +142,7 @@ impl Scanner {
         };
         let (Some(compression), None) = (compression, &fault) else {
             if let Some(kind) = fault {
-                if !self.has(kept.total)? {
-                    self.lost(at, kept.total)?;
-                    return Ok(None);
-                }
-                self.pass_over(at, kept.total)?;
-                let messages = self.indexed()?;
-                self.problems.add(at, kind, messages);
-                self.problems.skip(kept.total);
+                self.leave_out(at, kept.total, kind)?;
             }
             return Ok(None);
         };
@@ -169,24 +162,7 @@ impl Scanner {
             self.lost(at, kept.total)?;
             return Ok(None);
         }
-        let payload = match self.tape.input() {
-            Input::File(file) => {
-                let file = Arc::clone(file);
-                let have = self.tape.remaining().unwrap_or(0).min(kept.total);
-                self.tape.skip(have)?;
-                Payload::At {
-                    file,
-                    offset: at + start as u64,
-                    len: usize::try_from(have).unwrap_or(0).saturating_sub(start),
-                }
-            }
-            Input::Stream { .. } => {
-                let have = self.tape.available(total, total)?.len().min(total);
-                let mut held = self.tape.hand_out(have);
-                held.range.start = (held.range.start + start).min(held.range.end);
-                Payload::Held(held)
-            }
-        };
+        let payload = self.payload(at, start, kept.total)?;
         if is_cut {
             let have = self.tape.position().saturating_sub(at);
             let need = kept.total;
@@ -209,6 +185,42 @@ impl Scanner {
             },
             payload,
         })))
+    }
+
+    /// Passes over a chunk that is not read, if all of it is there.
+    fn leave_out(&mut self, at: u64, total: u64, kind: ProblemKind) -> io::Result<()> {
+        if !self.has(total)? {
+            self.lost(at, total)?;
+            return Ok(());
+        }
+        self.pass_over(at, total)?;
+        let messages = self.indexed()?;
+        self.problems.add(at, kind, messages);
+        self.problems.skip(total);
+        Ok(())
+    }
+
+    /// The bytes behind `start` of what is `total` long, as far as they are there.
+    fn payload(&mut self, at: u64, start: usize, total: u64) -> io::Result<Payload> {
+        Ok(match self.tape.input() {
+            Input::File(file) => {
+                let file = Arc::clone(file);
+                let have = self.tape.remaining().unwrap_or(0).min(total);
+                self.tape.skip(have)?;
+                Payload::At {
+                    file,
+                    offset: at + start as u64,
+                    len: usize::try_from(have).unwrap_or(0).saturating_sub(start),
+                }
+            }
+            Input::Stream { .. } => {
+                let total = usize::try_from(total).unwrap_or(usize::MAX);
+                let have = self.tape.available(total, total)?.len().min(total);
+                let mut held = self.tape.hand_out(have);
+                held.range.start = (held.range.start + start).min(held.range.end);
+                Payload::Held(held)
+            }
+        })
     }
 
     /// Whether a chunk begins behind the record at `at`, which does not end within the input.

@@ -51,15 +51,10 @@ impl Scanner {
         }
         self.crc = None;
         let limit = self.limits.record;
-        let fault = if packed.max(size) > limit {
-            Some(ProblemKind::ChunkTooBig {
-                size: packed.max(size),
-                limit,
-            })
-        } else if compression.is_none() {
-            Some(ProblemKind::UnknownCompression { name })
-        } else {
-            None
+        let fault = match (packed.max(size), compression) {
+            (size, _) if size > limit => Some(ProblemKind::ChunkTooBig { size, limit }),
+            (_, None) => Some(ProblemKind::UnknownCompression { name }),
+            _ => None,
         };
         let (Some(compression), None, Ok(size), Ok(packed)) = (
             compression,
@@ -78,39 +73,8 @@ impl Scanner {
             return Ok(None);
         };
         self.peek = if total < SMALL { PEEK_SMALL } else { PEEK };
-        let all = usize::try_from(total).unwrap_or(usize::MAX);
-        let copy = if total < SMALL {
-            self.tape.copy_out(all)
-        } else {
-            None
-        };
-        let payload = match (copy, self.tape.input()) {
-            (Some(held), _) => Payload::Held(held),
-            (None, Input::File(file)) => {
-                let (file, offset) = (Arc::clone(file), at + start);
-                self.tape.skip(total)?;
-                Payload::At {
-                    file,
-                    offset,
-                    len: packed,
-                }
-            }
-            (None, Input::Stream { .. }) => {
-                let have = self.tape.available(all, all)?.len();
-                if have < all {
-                    return self.lost(at, total);
-                }
-                Payload::Held(self.tape.hand_out(all))
-            }
-        };
-        let payload = match payload {
-            Payload::Held(mut held) => {
-                let start = usize::try_from(start).unwrap_or(usize::MAX);
-                let from = held.range.start.saturating_add(start);
-                held.range = from..from.saturating_add(packed);
-                Payload::Held(held)
-            }
-            at => at,
+        let Some(payload) = self.payload(at, start, packed, total)? else {
+            return self.lost(at, total);
         };
         self.trusted = None;
         let indexed = self.indexed()?;
@@ -127,6 +91,44 @@ impl Scanner {
             kind,
             payload,
         })))
+    }
+
+    /// The bytes of a chunk of `total` whose `packed` ones begin behind `start`; `None` where they are not all there.
+    fn payload(
+        &mut self,
+        at: u64,
+        start: u64,
+        packed: usize,
+        total: u64,
+    ) -> io::Result<Option<Payload>> {
+        let all = usize::try_from(total).unwrap_or(usize::MAX);
+        let copy = if total < SMALL {
+            self.tape.copy_out(all)
+        } else {
+            None
+        };
+        let mut held = match (copy, self.tape.input()) {
+            (Some(held), _) => held,
+            (None, Input::File(file)) => {
+                let (file, offset) = (Arc::clone(file), at + start);
+                self.tape.skip(total)?;
+                return Ok(Some(Payload::At {
+                    file,
+                    offset,
+                    len: packed,
+                }));
+            }
+            (None, Input::Stream { .. }) => {
+                if self.tape.available(all, all)?.len() < all {
+                    return Ok(None);
+                }
+                self.tape.hand_out(all)
+            }
+        };
+        let start = usize::try_from(start).unwrap_or(usize::MAX);
+        let from = held.range.start.saturating_add(start);
+        held.range = from..from.saturating_add(packed);
+        Ok(Some(Payload::Held(held)))
     }
 
     /// A chunk whose length was never filled in: what is uncompressed is read as if unchunked.
