@@ -64,15 +64,7 @@ impl Overview<'_> {
     /// The command to run next, with the flags this log needs.
     #[must_use]
     pub fn next(&self) -> String {
-        let file = match self.input.source() {
-            Source::File(path) => quoted_file(path),
-            Source::Parts(paths) => {
-                let files: Vec<String> = paths.iter().map(|path| quoted_file(path)).collect();
-                format!("{JOIN} {}", files.join(" "))
-            }
-            Source::Stdin => "-".to_owned(),
-            Source::Elsewhere(_) => quoted_file(&self.input.source().name()),
-        };
+        let file = typed(self.input.source());
         if let Some(made) = &self.made_before {
             let of = made.of.as_ref().map(|of| quoted_file(Path::new(of)));
             let of = of.unwrap_or_else(|| "RECORDING".to_owned());
@@ -246,6 +238,19 @@ fn aids_json(aids: &Aids) -> Value {
         "force_topics": aids.forces.iter().map(topic).collect::<Vec<_>>(),
         "notes": aids.notes,
     })
+}
+
+/// A source as it is typed.
+fn typed(source: &Source) -> String {
+    match source {
+        Source::File(path) => quoted_file(path),
+        Source::Parts(paths) => {
+            let files: Vec<String> = paths.iter().map(|path| quoted_file(path)).collect();
+            format!("{JOIN} {}", files.join(" "))
+        }
+        Source::Stdin => "-".to_owned(),
+        Source::Elsewhere(_) => quoted_file(&source.name()),
+    }
 }
 
 #[cfg(test)]

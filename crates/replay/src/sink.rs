@@ -5,6 +5,9 @@
 //! 2048 are formatted and compressed in parallel and written in the order in which they
 //! filled. The bytes depend on the samples and the order of the calls alone: not on the number of
 //! threads and not (within a stream) on how the samples were cut into calls.
+//!
+//! Long because it is one queue: what is formatted, what is written and what has failed decide on each other. What a format
+//! looks like is in the files below.
 
 pub mod address;
 mod batch;

@@ -20,6 +20,7 @@ use strapd_recording::Recording;
 use strapd_recording::attitude_line::{Attitude, TRUTH_ID};
 use strapd_recording::decode::{Options, Role};
 use strapd_recording::format::Format;
+use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::{Item, Route};
 use strapd_recording::recording::decoders::Decoders;
@@ -97,6 +98,13 @@ pub fn read(
     }
 }
 
+/// The world that our own outputs say the numbers of a topic are in.
+fn world_of<'s>(survey: &'s Survey, topic: &str) -> Option<&'s String> {
+    let labels = &survey.facts.provenance;
+    let of_topic = || labels.get(&format!("{topic} world"));
+    labels.get("world").or_else(of_topic)
+}
+
 fn from_log(
     input: &Input,
     side: Side,
@@ -137,11 +145,7 @@ fn from_log(
             Ok(std::ops::ControlFlow::Continue(()))
         },
     )?;
-    // Our own outputs say what world their numbers are in.
-    let labels = &survey.facts.provenance;
-    let world = labels
-        .get("world")
-        .or_else(|| labels.get(&format!("{} world", known.channel.topic)));
+    let world = world_of(&survey, &known.channel.topic);
     let convention = world.map_or(stated, |world| convention_of(world));
     // About which axes another program's are is known of none.
     let pairs = entries.iter().zip(covariances);
@@ -283,6 +287,31 @@ fn carries_orientation(known: &LogChannel, decoders: &mut Decoders) -> bool {
 /// The longest line read from an NDJSON file.
 const LINE_LIMIT: u64 = 64 * 1024;
 
+/// Choice between two streams of attitudes.
+enum Better {
+    Before,
+    Same,
+    This,
+}
+
+/// Returns whether the stream of a line is read instead of the one before: the truth for a reference alone.
+fn better(before: Option<&str>, this: &str, side: Side) -> std::result::Result<Better, String> {
+    let Some(before) = before else {
+        return Ok(Better::This);
+    };
+    let wanted = |id: &str| (id == TRUTH_ID) == (side == Side::Reference);
+    match (wanted(before), wanted(this)) {
+        _ if before == this => Ok(Better::Same),
+        (true, false) => Ok(Better::Before),
+        (false, true) => Ok(Better::This),
+        _ => Err(format!(
+            "attitudes of both `{}` and `{}`; {TOPIC} ID takes one",
+            printable(before),
+            printable(this)
+        )),
+    }
+}
+
 /// Reads the `ATT` lines of an NDJSON file; `id` picks one of several streams, of which the truth is
 /// taken for a reference and left for an estimate.
 ///
@@ -320,28 +349,15 @@ fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<(Entry
         let Some(att) = read.filter(|att| id.is_none_or(|id| id == att.id)) else {
             continue;
         };
-        let wanted = |id: &str| (id == TRUTH_ID) == (side == Side::Reference);
-        match &seen {
-            Some(first) if *first != att.id => match (wanted(first), wanted(&att.id)) {
-                (true, false) => continue,
-                (false, true) => {
-                    track.clear();
-                    seen = Some(att.id.clone());
-                }
-                _ => {
-                    return Err(bad_line(
-                        path,
-                        number,
-                        &format!(
-                            "attitudes of both `{}` and `{}`; {TOPIC} ID takes one",
-                            printable(first),
-                            printable(&att.id)
-                        ),
-                    ));
-                }
-            },
-            Some(_) => {}
-            None => seen = Some(att.id.clone()),
+        match better(seen.as_deref(), &att.id, side)
+            .map_err(|what| bad_line(path, number, &what))?
+        {
+            Better::Before => continue,
+            Better::Same => {}
+            Better::This => {
+                track.clear();
+                seen = Some(att.id.clone());
+            }
         }
         if let Some(stamp) = att.stamp {
             let entry = (stamp, in_flu(convention_of(&att.world), att.q));

@@ -88,19 +88,8 @@ pub fn examine(
         .filter(|name| *name != "all");
     let path = input.name();
     let log = Recording::told_apart(input, named, &asked.selection.decode, pool)?;
-    for topic in named
-        .into_iter()
-        .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
-    {
-        if !log.has(topic) {
-            return Err(strapd_recording::Error::NoSuchTopic {
-                path: path.to_owned(),
-                topic: topic.to_owned(),
-                topics: strapd_recording::recording::topics::listing(&log.candidates()),
-            }
-            .into());
-        }
-    }
+    let reference = Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty());
+    are_there(&log, named.into_iter().chain(reference))?;
     let looks = look_as(&log, named, (&asked.selection.decode, &asked.plan), pool)?;
     let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
         || log
@@ -141,6 +130,21 @@ pub fn examine(
             None => looks.left_out,
         },
     })
+}
+
+/// Refuses topics that are not in the log.
+fn are_there<'n>(log: &Recording, names: impl Iterator<Item = &'n str>) -> Result<()> {
+    for topic in names {
+        if !log.has(topic) {
+            return Err(strapd_recording::Error::NoSuchTopic {
+                path: log.name().to_owned(),
+                topic: topic.to_owned(),
+                topics: strapd_recording::recording::topics::listing(&log.candidates()),
+            }
+            .into());
+        }
+    }
+    Ok(())
 }
 
 fn integrate(

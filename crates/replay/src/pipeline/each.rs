@@ -4,7 +4,7 @@
 //! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
 //! square of its size.
 
-use super::channel_choice::{RunTopic, besides, choose_each, reference, route};
+use super::channel_choice::{Reference, RunTopic, besides, choose_each, reference, route};
 use super::check::Drawing;
 use super::delivery::{Delivery, Outlet};
 use super::history::History;
@@ -18,7 +18,9 @@ use super::summarise::TopicOutcome;
 use crate::error::{Error, Result};
 use crate::sink::{Provenance, Stream};
 use std::ops::ControlFlow;
+use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::Prepared;
 use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::AuxiliaryInputs;
@@ -64,43 +66,14 @@ pub(super) fn each(
     };
 
     let prepared = prepare(run, log, (&chosen, &AuxiliaryInputs::default()), pool)?;
-    let mut topics = Vec::new();
-    let mut streams: Vec<Stream> = Vec::new();
-    let mut kept = Vec::new();
-    let mut open = told.iter_mut().filter(|told| told.is_none());
-    for (chosen, prepared) in chosen.into_iter().zip(prepared) {
-        let begun = prepared.and_then(|prepared| {
-            let start = (chosen.found.clone(), chosen.stream.clone());
-            topic(run, path, start, prepared)
-        });
-        let slot = open.next();
-        match begun {
-            Ok((topic, stream)) => {
-                topics.push(topic);
-                streams.push(stream);
-                kept.push(chosen);
-            }
-            Err(refused) => {
-                if let Some(slot) = slot {
-                    *slot = Some(Err(Diagnostic::from(&refused)));
-                }
-            }
-        }
-    }
-    let besides = besides(run, path, log, &mut kept)?;
-    let together = topics.len();
-    for (topic, chosen) in topics.iter_mut().zip(&kept) {
-        if let Some(against) = &mut topic.against {
-            against.share_room(together);
-            let own = reference.as_ref().is_some_and(|r| r.is_of(chosen));
-            if let Some(reference) = reference.as_ref().filter(|_| !own) {
-                against.take_reference_from(&reference.resolved);
-            }
-        }
-        if let Some(drawing) = drawing {
-            draw(topic, drawing);
-        }
-    }
+    let mut begun = Begun::of((run, path), chosen.into_iter().zip(prepared), &mut told);
+    let besides = besides(run, path, log, &mut begun.chosen)?;
+    begun.compare(reference.as_ref(), drawing);
+    let Begun {
+        topics,
+        streams,
+        chosen,
+    } = begun;
     let provenance = Provenance::default();
     let outlet = Outlet::open(
         &[],
@@ -115,7 +88,7 @@ pub(super) fn each(
     log.walk::<Error>(
         AHEAD,
         pool,
-        |channel| route(&kept, reference.as_ref(), &besides, false, channel),
+        |channel| route(&chosen, reference.as_ref(), &besides, false, channel),
         |items| {
             let done = done(items, span);
             let _ = session.consume(items.drain(..), pool)?;
@@ -130,6 +103,57 @@ pub(super) fn each(
         .into_iter()
         .map(|told| told.unwrap_or_else(&mut next))
         .collect())
+}
+
+/// Topics that are integrated together.
+#[derive(Default)]
+struct Begun<'l> {
+    topics: Vec<Topic>,
+    streams: Vec<Stream>,
+    chosen: Vec<RunTopic<'l>>,
+}
+
+impl<'l> Begun<'l> {
+    /// Begins those that can be; why another cannot is its outcome, in the place that is still open.
+    fn of(
+        (run, path): (&ReplayRequest, &Path),
+        chosen: impl Iterator<Item = (RunTopic<'l>, Result<Prepared>)>,
+        told: &mut [Option<TopicOutcome>],
+    ) -> Begun<'l> {
+        let mut all = Begun::default();
+        let open = told.iter_mut().filter(|told| told.is_none());
+        for ((chosen, prepared), slot) in chosen.zip(open) {
+            let begun = prepared.and_then(|prepared| {
+                let start = (chosen.found.clone(), chosen.stream.clone());
+                topic(run, path, start, prepared)
+            });
+            match begun {
+                Ok((topic, stream)) => {
+                    all.topics.push(topic);
+                    all.streams.push(stream);
+                    all.chosen.push(chosen);
+                }
+                Err(refused) => *slot = Some(Err(Diagnostic::from(&refused))),
+            }
+        }
+        all
+    }
+
+    /// Holds each against the reference, and keeps what is drawn of it.
+    fn compare(&mut self, reference: Option<&Reference>, drawing: Option<&Drawing<'_>>) {
+        let together = self.topics.len();
+        for (topic, chosen) in self.topics.iter_mut().zip(&self.chosen) {
+            if let Some(against) = &mut topic.against {
+                against.share_room(together);
+                if let Some(reference) = reference.filter(|r| !r.is_of(chosen)) {
+                    against.take_reference_from(&reference.resolved);
+                }
+            }
+            if let Some(drawing) = drawing {
+                draw(topic, drawing);
+            }
+        }
+    }
 }
 
 fn draw(topic: &mut Topic, drawing: &Drawing<'_>) {

@@ -196,22 +196,7 @@ pub(crate) fn look_as(
     let path = log.name();
     let (wanted, left_out) = wanted(log, named);
     let unsupported = |what: Diagnostic| Error::unsupported(path, what);
-    let mut decoders = Decoders::of_run(plan, options);
-    let (mut looks, mut plans): (Vec<TopicInspector>, Vec<TopicPlan<'_>>) = Default::default();
-    for (source, is_named) in wanted {
-        let is_likely = |known: &LogChannel| is_named || known.rank() >= PICKED_UNNAMED;
-        let of_topic = TopicPlan::of(log, source.clone(), &mut decoders, is_likely);
-        for why in &of_topic.refusals {
-            if named.is_some() {
-                return Err(unsupported(Diagnostic::from(why)));
-            }
-            tracing::warn!("{why}");
-        }
-        if let Some(look) = begin(&of_topic, plan) {
-            looks.push(look);
-            plans.push(of_topic);
-        }
-    }
+    let (mut looks, plans) = begin_all(log, wanted, named.is_some(), (options, plan))?;
     let noticed = |source: &Publisher| Arc::new(Noticed::of(source));
     let noticed: Vec<Arc<Noticed>> = plans.iter().map(|of| noticed(&of.source)).collect();
     let survey = log.walk::<Error>(
@@ -246,8 +231,44 @@ pub(crate) fn look_as(
         .into_iter()
         .map(|look| look.finish().map_err(unsupported))
         .collect::<Result<Vec<_>>>()?;
+    compare(&mut topics, log);
+    Ok(LogInspection {
+        topics,
+        left_out,
+        survey,
+    })
+}
+
+/// Inspectors of these topics, and how each is read; what cannot be read is an error only where it is `asked` for.
+fn begin_all<'l>(
+    log: &'l Recording,
+    wanted: Vec<(&'l Publisher, bool)>,
+    asked: bool,
+    (options, plan): (&Options, &Plan),
+) -> Result<(Vec<TopicInspector>, Vec<TopicPlan<'l>>)> {
+    let mut decoders = Decoders::of_run(plan, options);
+    let (mut looks, mut plans) = (Vec::new(), Vec::new());
+    for (source, is_named) in wanted {
+        let is_likely = |known: &LogChannel| is_named || known.rank() >= PICKED_UNNAMED;
+        let of_topic = TopicPlan::of(log, source.clone(), &mut decoders, is_likely);
+        for why in &of_topic.refusals {
+            if asked {
+                return Err(Error::unsupported(log.name(), Diagnostic::from(why)));
+            }
+            tracing::warn!("{why}");
+        }
+        if let Some(look) = begin(&of_topic, plan) {
+            looks.push(look);
+            plans.push(of_topic);
+        }
+    }
+    Ok((looks, plans))
+}
+
+/// Adds to each topic what the rest of the log says of it: what lies beside it, and whether it is the likely one.
+fn compare(topics: &mut [Inspection], log: &Recording) {
     let vectors = Vectors::of(log);
-    for topic in &mut topics {
+    for topic in topics.iter_mut() {
         let (fields, taken, forces) = vectors.beside(&topic.of);
         (topic.aid.fields, topic.aid.forces) = ((fields, taken), forces);
         topic.has_reference = topic.quality.with_orientation > 0
@@ -262,14 +283,9 @@ pub(crate) fn look_as(
             .max()
     };
     let best = topics.iter().map(rank_of).max().flatten();
-    for topic in &mut topics {
+    for topic in topics {
         topic.is_likely = rank_of(topic) == best;
     }
-    Ok(LogInspection {
-        topics,
-        left_out,
-        survey,
-    })
 }
 
 /// Whether a replay that names none finds one topic of orientations beside the samples' own.

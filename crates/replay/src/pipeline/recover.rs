@@ -214,21 +214,7 @@ fn still_wanted(flow: Flow) -> Result<()> {
 /// Input or output cannot be opened, read or written; then there is no output. Damage is no error:
 /// see [`Recovered::survey`].
 pub fn run(run: &Recover, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<Recovered> {
-    let reader = match &run.source {
-        Source::File(path) => Reader::open(path)?,
-        Source::Parts(_) => {
-            return Err(Error::usage(
-                Diagnostic::new("what is recovered is one file")
-                    .help("recover each, and join them then"),
-            ));
-        }
-        Source::Stdin => Reader::from_stream(run.source.name(), Box::new(std::io::stdin()))?,
-        Source::Elsewhere(_) => {
-            return Err(Error::usage(
-                Diagnostic::new("what is recovered is a file").help("save it to one first"),
-            ));
-        }
-    };
+    let reader = open(&run.source)?;
     let size = reader.size();
     let inputs = run.source.files();
     let copying = RefCell::new(Copying {
@@ -278,4 +264,21 @@ pub fn run(run: &Recover, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Resu
         attachments: copying.attachments,
         metadata: copying.metadata,
     })
+}
+
+/// Opens the one file that is recovered, or standard input.
+fn open(source: &Source) -> Result<Reader> {
+    let refuse = |what: &str, help: &str| Err(Error::usage(Diagnostic::new(what).help(help)));
+    match source {
+        Source::File(path) => Ok(Reader::open(path)?),
+        Source::Stdin => {
+            let stdin = Box::new(std::io::stdin());
+            Ok(Reader::from_stream(source.name(), stdin)?)
+        }
+        Source::Parts(_) => refuse(
+            "what is recovered is one file",
+            "recover each, and join them then",
+        ),
+        Source::Elsewhere(_) => refuse("what is recovered is a file", "save it to one first"),
+    }
 }

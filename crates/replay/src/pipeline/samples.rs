@@ -68,17 +68,7 @@ pub fn estimate<E>(
         noticed: Arc::default(),
         warnings: Vec::new(),
     };
-    let mut preparation = preparation(&run, &found, Patience::WholeLog);
-    for (n, raw) in samples.clone().enumerate() {
-        if n.is_multiple_of(BLOCK) {
-            if n > 0 && !preparation.wants_more() {
-                break;
-            }
-            take(&[]).map_err(Stop::Ended)?;
-        }
-        preparation.take(&raw).map_err(Stop::Refused)?;
-    }
-    let prepared = preparation.decide().map_err(Stop::Refused)?;
+    let prepared = prepare(&run, &found, samples.clone(), &mut take)?;
     let mut topic = Topic::new(path, plan, found, prepared, false)?;
     // That a calibration is of a sensor of another name: these have none.
     topic.warnings.clear();
@@ -120,6 +110,26 @@ pub fn estimate<E>(
         ),
         ..summary
     })
+}
+
+/// Finds what must be known before the first attitude.
+fn prepare<E>(
+    run: &ReplayRequest,
+    found: &TopicInfo,
+    samples: impl Iterator<Item = RawSample>,
+    take: &mut impl FnMut(&[AttitudeSample]) -> Result<(), E>,
+) -> Result<Prepared, Stop<E>> {
+    let mut preparation = preparation(run, found, Patience::WholeLog);
+    for (n, raw) in samples.enumerate() {
+        if n.is_multiple_of(BLOCK) {
+            if n > 0 && !preparation.wants_more() {
+                break;
+            }
+            take(&[]).map_err(Stop::Ended)?;
+        }
+        preparation.take(&raw).map_err(Stop::Refused)?;
+    }
+    preparation.decide().map_err(Stop::Refused)
 }
 
 /// The same of an estimator whose samples still come, under the same names: what it knows now. It has given `written`

@@ -65,24 +65,10 @@ pub fn run(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<SimulationSummary> {
     let begun = Instant::now();
-    let mut outlet = Outlet::open(
-        &simulation.targets,
-        &[],
-        simulation.options,
-        &streams(&simulation),
-        &provenance(&simulation),
-        Delivery {
-            out_rate: None,
-            speed: simulation.speed,
-            audience: simulation.audience.clone(),
-        },
-    )?;
+    let mut outlet = open(&simulation)?;
     let steps = simulation.source.count().saturating_sub(1);
     outlet.length(steps as f64 / simulation.rate_hz);
-    let batch = match simulation.speed {
-        None => BATCH,
-        Some(speed) => ((simulation.rate_hz * speed * PACED_SECS) as usize).clamp(1, BATCH),
-    };
+    let batch = batch(&simulation);
     let source = &mut simulation.source;
     let (mut stretch, mut truth) = (Stretch::default(), Vec::new());
     let mut reader_gone = false;
@@ -126,6 +112,29 @@ pub fn run(
         reader_gone,
         elapsed_secs: begun.elapsed().as_secs_f64(),
     })
+}
+
+fn open(simulation: &Simulation) -> Result<Outlet> {
+    Outlet::open(
+        &simulation.targets,
+        &[],
+        simulation.options,
+        &streams(simulation),
+        &provenance(simulation),
+        Delivery {
+            out_rate: None,
+            speed: simulation.speed,
+            audience: simulation.audience.clone(),
+        },
+    )
+}
+
+/// Samples that are made at once: few, where they leave at the pace of a clock.
+fn batch(simulation: &Simulation) -> usize {
+    match simulation.speed {
+        None => BATCH,
+        Some(speed) => ((simulation.rate_hz * speed * PACED_SECS) as usize).clamp(1, BATCH),
+    }
 }
 
 fn streams(simulation: &Simulation) -> [Stream; 2] {

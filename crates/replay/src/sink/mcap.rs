@@ -8,6 +8,7 @@ pub(super) mod cdr;
 pub(super) mod chunk;
 pub(super) mod file;
 pub(super) mod live;
+mod messages;
 pub mod payload;
 mod schemas;
 
@@ -19,6 +20,7 @@ use crate::error::{Error, Result};
 use chunk::{Chunk, Compression};
 pub use file::Attachment;
 use file::McapFile;
+use messages::{CdrMessages, JsonMessages, Messages, SampleMessages, TruthMessages};
 use std::collections::BTreeMap;
 use std::io;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -151,34 +153,6 @@ pub(super) struct Layout {
     streams: Vec<Messages>,
 }
 
-#[derive(Debug)]
-enum Messages {
-    Cdr {
-        attitude: u16,
-        imu: cdr::Imu,
-        transform: u16,
-        tf: cdr::Tf,
-    },
-    Json {
-        attitude: u16,
-        att: AttObject,
-        transform: u16,
-        frame_transform: FrameTransform,
-    },
-    Samples {
-        channel: u16,
-        imu: cdr::Imu,
-        /// The field and its nine covariances.
-        field: Option<(u16, cdr::Stamped<12>)>,
-    },
-    Truth {
-        attitude: u16,
-        quaternion: cdr::Stamped<4>,
-        rate: u16,
-        vector: cdr::Stamped<3>,
-    },
-}
-
 impl Layout {
     /// Declares every stream's channels; the head of the file goes to `out`.
     fn begin(
@@ -206,46 +180,7 @@ impl Layout {
                 ],
             ),
         };
-        let attitudes = streams
-            .iter()
-            .map(|stream| match stream.content {
-                Content::Attitude => declare(&stream.output_topic, attitude_schema),
-                _ if encoding == Encoding::Json => Err(only_attitudes_are_json()),
-                Content::Samples(_) => declare(
-                    &stream.output_topic,
-                    ["sensor_msgs/msg/Imu", "ros2msg", schemas::IMU],
-                ),
-                Content::Truth => declare(
-                    &stream.output_topic,
-                    [
-                        "geometry_msgs/msg/QuaternionStamped",
-                        "ros2msg",
-                        schemas::QUATERNION_STAMPED,
-                    ],
-                ),
-            })
-            .collect::<Result<Vec<u16>>>()?;
-        let rates = streams
-            .iter()
-            .map(|stream| match stream.content {
-                Content::Truth => declare(
-                    &format!("{}/rate", stream.output_topic),
-                    [
-                        "geometry_msgs/msg/Vector3Stamped",
-                        "ros2msg",
-                        schemas::VECTOR3_STAMPED,
-                    ],
-                ),
-                Content::Attitude | Content::Samples(_) => Ok(0),
-            })
-            .collect::<Result<Vec<u16>>>()?;
-        let fields = streams
-            .iter()
-            .map(|stream| match (&stream.content, &stream.field_topic) {
-                (Content::Samples(_), Some(topic)) => declare(topic, FIELD_SCHEMA).map(Some),
-                _ => Ok(None),
-            })
-            .collect::<Result<Vec<Option<u16>>>>()?;
+        let topics = Declared::of(streams, encoding, attitude_schema, &mut declare)?;
         let transform = if streams.iter().any(|s| s.content == Content::Attitude) {
             declare(TF_TOPIC, transform_schema)?
         } else {
@@ -254,150 +189,119 @@ impl Layout {
 
         let mut frames = ChildFrames::default();
         let children: Vec<String> = streams.iter().map(|stream| frames.take(stream)).collect();
-        let streams = streams
-            .iter()
-            .zip(attitudes)
-            .zip(rates)
-            .zip(fields)
-            .zip(&children)
-            .map(|((((stream, attitude), rate), field), child)| {
-                let parent = parent_frame(stream);
-                match stream.content {
-                    Content::Samples(_) => {
-                        return Messages::Samples {
-                            channel: attitude,
-                            imu: cdr::Imu::new(attitude, &stream.frame_id),
-                            field: field.map(|id| (id, cdr::Stamped::new(id, &stream.frame_id))),
-                        };
-                    }
-                    Content::Truth => {
-                        return Messages::Truth {
-                            attitude,
-                            quaternion: cdr::Stamped::new(attitude, &parent),
-                            rate,
-                            vector: cdr::Stamped::new(rate, &stream.frame_id),
-                        };
-                    }
-                    Content::Attitude => {}
-                }
-                match encoding {
-                    Encoding::Cdr => Messages::Cdr {
-                        attitude,
-                        imu: cdr::Imu::new(attitude, named_frame(stream, child)),
-                        transform,
-                        tf: cdr::Tf::new(transform, &parent, child),
-                    },
-                    Encoding::Json => Messages::Json {
-                        attitude,
-                        att: AttObject::new(stream),
-                        transform,
-                        frame_transform: FrameTransform::new(&parent, child),
-                    },
-                }
-            })
-            .collect();
-        Ok(Layout { streams })
+        let all = streams.iter().zip(topics).zip(&children);
+        let messages = |((stream, topics), child): ((&Stream, Declared), &String)| {
+            topics.messages(stream, encoding, transform, child)
+        };
+        Ok(Layout {
+            streams: all.map(messages).collect(),
+        })
     }
 
-    /// Fills an empty chunk. A transform with the stamp of the one before is left out: tf2 warns
-    /// about each.
     fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
-        let Some(messages) = self.streams.get(batch.stream) else {
-            return;
-        };
-        let mut previous = batch.previous;
-        match messages {
-            Messages::Cdr {
-                attitude,
-                imu,
+        if let Some(messages) = self.streams.get(batch.stream) {
+            messages.fill(chunk, batch);
+        }
+    }
+}
+
+/// Channels of a stream.
+struct Declared {
+    /// Attitudes, or samples.
+    main: u16,
+    /// True rates.
+    rate: u16,
+    /// Magnetic field.
+    field: Option<u16>,
+}
+
+impl Declared {
+    /// Declares those of all streams: first every stream's own, then those beside them.
+    fn of(
+        streams: &[Stream],
+        encoding: Encoding,
+        attitude_schema: [&str; 3],
+        declare: &mut dyn FnMut(&str, [&str; 3]) -> Result<u16>,
+    ) -> Result<Vec<Declared>> {
+        let mut all = Vec::new();
+        for stream in streams {
+            let schema = match stream.content {
+                Content::Attitude => attitude_schema,
+                _ if encoding == Encoding::Json => return Err(only_attitudes_are_json()),
+                Content::Samples(_) => IMU_SCHEMA,
+                Content::Truth => QUATERNION_SCHEMA,
+            };
+            all.push(Declared {
+                main: declare(&stream.output_topic, schema)?,
+                rate: 0,
+                field: None,
+            });
+        }
+        for (stream, own) in streams.iter().zip(&mut all) {
+            if stream.content == Content::Truth {
+                own.rate = declare(&format!("{}/rate", stream.output_topic), VECTOR_SCHEMA)?;
+            }
+        }
+        for (stream, own) in streams.iter().zip(&mut all) {
+            if let (Content::Samples(_), Some(topic)) = (&stream.content, &stream.field_topic) {
+                own.field = Some(declare(topic, FIELD_SCHEMA)?);
+            }
+        }
+        Ok(all)
+    }
+
+    /// The messages of a stream with these channels.
+    fn messages(
+        self,
+        stream: &Stream,
+        encoding: Encoding,
+        transform: u16,
+        child: &str,
+    ) -> Messages {
+        let parent = parent_frame(stream);
+        let main = self.main;
+        match (&stream.content, encoding) {
+            (Content::Samples(_), _) => Messages::Samples(SampleMessages {
+                channel: main,
+                imu: cdr::Imu::new(main, &stream.frame_id),
+                field: self
+                    .field
+                    .map(|id| (id, cdr::Stamped::new(id, &stream.frame_id))),
+            }),
+            (Content::Truth, _) => Messages::Truth(TruthMessages {
+                attitude: main,
+                quaternion: cdr::Stamped::new(main, &parent),
+                rate: self.rate,
+                vector: cdr::Stamped::new(self.rate, &stream.frame_id),
+            }),
+            (Content::Attitude, Encoding::Cdr) => Messages::Cdr(CdrMessages {
+                attitude: main,
+                imu: cdr::Imu::new(main, named_frame(stream, child)),
                 transform,
-                tf,
-            } => {
-                let (attitude, transform) = (chunk.lane(*attitude), chunk.lane(*transform));
-                chunk
-                    .plain
-                    .reserve(batch.samples.len() * (imu.len() + tf.len()));
-                for (n, sample) in (batch.first..).zip(&batch.samples) {
-                    let log_time = log_time(sample.log);
-                    let (stamp, fits) = cdr::ros_time(sample.stamp);
-                    chunk.stamps_out_of_range += u64::from(!fits);
-                    chunk.note(attitude, log_time);
-                    imu.append(&mut chunk.plain, n as u32, log_time, stamp, sample);
-                    if previous.replace(sample.stamp) != Some(sample.stamp) {
-                        chunk.note(transform, log_time);
-                        tf.append(&mut chunk.plain, n as u32, log_time, stamp, sample);
-                    }
-                }
-            }
-            Messages::Json {
-                attitude,
-                att,
+                tf: cdr::Tf::new(transform, &parent, child),
+            }),
+            (Content::Attitude, Encoding::Json) => Messages::Json(JsonMessages {
+                attitude: main,
+                att: AttObject::new(stream),
                 transform,
-                frame_transform,
-            } => {
-                let mut text = Vec::new();
-                for (n, sample) in (batch.first..).zip(&batch.samples) {
-                    let log_time = log_time(sample.log);
-                    text.clear();
-                    att.push(&mut text, n, sample);
-                    chunk.push(*attitude, n as u32, log_time, log_time, &text);
-                    if previous.replace(sample.stamp) != Some(sample.stamp) {
-                        text.clear();
-                        frame_transform.push(&mut text, sample);
-                        chunk.push(*transform, n as u32, log_time, log_time, &text);
-                    }
-                }
-            }
-            Messages::Samples {
-                channel,
-                imu,
-                field,
-            } => {
-                let lane = chunk.lane(*channel);
-                let field = field.as_ref().map(|(id, field)| (chunk.lane(*id), field));
-                chunk.plain.reserve(batch.raw.len() * imu.len());
-                for (n, sample) in (batch.first..).zip(&batch.raw) {
-                    let log_time = log_time(sample.log);
-                    let (stamp, fits) = cdr::ros_time(sample.header.unwrap_or(sample.log));
-                    chunk.stamps_out_of_range += u64::from(!fits);
-                    chunk.note(lane, log_time);
-                    imu.append_raw(&mut chunk.plain, n as u32, log_time, stamp, sample);
-                    if let (Some((lane, field)), Some([x, y, z])) = (&field, sample.mag) {
-                        // A covariance of zeros is an unknown one.
-                        let numbers = [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-                        chunk.note(*lane, log_time);
-                        field.append(&mut chunk.plain, n as u32, log_time, stamp, numbers);
-                    }
-                }
-            }
-            Messages::Truth {
-                attitude,
-                quaternion,
-                rate,
-                vector,
-            } => {
-                let (attitude, rate) = (chunk.lane(*attitude), chunk.lane(*rate));
-                chunk
-                    .plain
-                    .reserve(batch.samples.len() * (quaternion.len() + vector.len()));
-                for (n, sample) in (batch.first..).zip(&batch.samples) {
-                    let log_time = log_time(sample.log);
-                    let (stamp, fits) = cdr::ros_time(sample.stamp);
-                    chunk.stamps_out_of_range += u64::from(!fits);
-                    let [w, x, y, z] = sample.q_nb.wxyz();
-                    chunk.note(attitude, log_time);
-                    quaternion.append(&mut chunk.plain, n as u32, log_time, stamp, [x, y, z, w]);
-                    chunk.note(rate, log_time);
-                    let w_nb_b = sample.rate.into();
-                    vector.append(&mut chunk.plain, n as u32, log_time, stamp, w_nb_b);
-                }
-            }
+                frame_transform: FrameTransform::new(&parent, child),
+            }),
         }
     }
 }
 
 /// Name, encoding and text of our ROS 2 types.
 const IMU_SCHEMA: [&str; 3] = ["sensor_msgs/msg/Imu", "ros2msg", schemas::IMU];
+const QUATERNION_SCHEMA: [&str; 3] = [
+    "geometry_msgs/msg/QuaternionStamped",
+    "ros2msg",
+    schemas::QUATERNION_STAMPED,
+];
+const VECTOR_SCHEMA: [&str; 3] = [
+    "geometry_msgs/msg/Vector3Stamped",
+    "ros2msg",
+    schemas::VECTOR3_STAMPED,
+];
 const FIELD_SCHEMA: [&str; 3] = [
     "sensor_msgs/msg/MagneticField",
     "ros2msg",

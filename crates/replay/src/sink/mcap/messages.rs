@@ -1,0 +1,154 @@
+//! Attitudes or samples -> the messages of their stream, in a chunk. Pure.
+//!
+//! Apart from the layout because it is the hot part: what a message is made of was decided when its channels were declared.
+
+use super::super::batch::Batch;
+use super::super::json::{AttObject, FrameTransform};
+use super::chunk::Chunk;
+use super::{cdr, log_time};
+
+/// Messages of a stream.
+#[derive(Debug)]
+pub(super) enum Messages {
+    Cdr(CdrMessages),
+    Json(JsonMessages),
+    Samples(SampleMessages),
+    Truth(TruthMessages),
+}
+
+impl Messages {
+    /// Fills an empty chunk. A transform with the stamp of the one before is left out: tf2 warns
+    /// about each.
+    pub(super) fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
+        match self {
+            Messages::Cdr(messages) => messages.fill(chunk, batch),
+            Messages::Json(messages) => messages.fill(chunk, batch),
+            Messages::Samples(messages) => messages.fill(chunk, batch),
+            Messages::Truth(messages) => messages.fill(chunk, batch),
+        }
+    }
+}
+
+/// The attitude as `Imu`, and its transform.
+#[derive(Debug)]
+pub(super) struct CdrMessages {
+    pub(super) attitude: u16,
+    pub(super) imu: cdr::Imu,
+    pub(super) transform: u16,
+    pub(super) tf: cdr::Tf,
+}
+
+impl CdrMessages {
+    fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
+        let mut previous = batch.previous;
+        let (attitude, transform) = (chunk.lane(self.attitude), chunk.lane(self.transform));
+        chunk
+            .plain
+            .reserve(batch.samples.len() * (self.imu.len() + self.tf.len()));
+        for (n, sample) in (batch.first..).zip(&batch.samples) {
+            let log_time = log_time(sample.log);
+            let (stamp, fits) = cdr::ros_time(sample.stamp);
+            chunk.stamps_out_of_range += u64::from(!fits);
+            chunk.note(attitude, log_time);
+            self.imu
+                .append(&mut chunk.plain, n as u32, log_time, stamp, sample);
+            if previous.replace(sample.stamp) != Some(sample.stamp) {
+                chunk.note(transform, log_time);
+                self.tf
+                    .append(&mut chunk.plain, n as u32, log_time, stamp, sample);
+            }
+        }
+    }
+}
+
+/// The same as JSON.
+#[derive(Debug)]
+pub(super) struct JsonMessages {
+    pub(super) attitude: u16,
+    pub(super) att: AttObject,
+    pub(super) transform: u16,
+    pub(super) frame_transform: FrameTransform,
+}
+
+impl JsonMessages {
+    fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
+        let mut previous = batch.previous;
+        let mut text = Vec::new();
+        for (n, sample) in (batch.first..).zip(&batch.samples) {
+            let log_time = log_time(sample.log);
+            text.clear();
+            self.att.push(&mut text, n, sample);
+            chunk.push(self.attitude, n as u32, log_time, log_time, &text);
+            if previous.replace(sample.stamp) != Some(sample.stamp) {
+                text.clear();
+                self.frame_transform.push(&mut text, sample);
+                chunk.push(self.transform, n as u32, log_time, log_time, &text);
+            }
+        }
+    }
+}
+
+/// Samples of a simulation.
+#[derive(Debug)]
+pub(super) struct SampleMessages {
+    pub(super) channel: u16,
+    pub(super) imu: cdr::Imu,
+    /// The field and its nine covariances.
+    pub(super) field: Option<(u16, cdr::Stamped<12>)>,
+}
+
+impl SampleMessages {
+    fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
+        let lane = chunk.lane(self.channel);
+        let field = self
+            .field
+            .as_ref()
+            .map(|(id, field)| (chunk.lane(*id), field));
+        chunk.plain.reserve(batch.raw.len() * self.imu.len());
+        for (n, sample) in (batch.first..).zip(&batch.raw) {
+            let log_time = log_time(sample.log);
+            let (stamp, fits) = cdr::ros_time(sample.header.unwrap_or(sample.log));
+            chunk.stamps_out_of_range += u64::from(!fits);
+            chunk.note(lane, log_time);
+            self.imu
+                .append_raw(&mut chunk.plain, n as u32, log_time, stamp, sample);
+            if let (Some((lane, field)), Some([x, y, z])) = (&field, sample.mag) {
+                // A covariance of zeros is an unknown one.
+                let numbers = [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+                chunk.note(*lane, log_time);
+                field.append(&mut chunk.plain, n as u32, log_time, stamp, numbers);
+            }
+        }
+    }
+}
+
+/// The true attitude and rate of a simulation.
+#[derive(Debug)]
+pub(super) struct TruthMessages {
+    pub(super) attitude: u16,
+    pub(super) quaternion: cdr::Stamped<4>,
+    pub(super) rate: u16,
+    pub(super) vector: cdr::Stamped<3>,
+}
+
+impl TruthMessages {
+    fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
+        let (attitude, rate) = (chunk.lane(self.attitude), chunk.lane(self.rate));
+        chunk
+            .plain
+            .reserve(batch.samples.len() * (self.quaternion.len() + self.vector.len()));
+        for (n, sample) in (batch.first..).zip(&batch.samples) {
+            let log_time = log_time(sample.log);
+            let (stamp, fits) = cdr::ros_time(sample.stamp);
+            chunk.stamps_out_of_range += u64::from(!fits);
+            let [w, x, y, z] = sample.q_nb.wxyz();
+            chunk.note(attitude, log_time);
+            self.quaternion
+                .append(&mut chunk.plain, n as u32, log_time, stamp, [x, y, z, w]);
+            chunk.note(rate, log_time);
+            let w_nb_b = sample.rate.into();
+            self.vector
+                .append(&mut chunk.plain, n as u32, log_time, stamp, w_nb_b);
+        }
+    }
+}
