@@ -137,7 +137,21 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
     });
     let sent = sent?;
     let read = read?;
-    let secs = begun.elapsed().as_secs_f64();
+    say(global, &remote, (&read, &sent), begun.elapsed())?;
+    Ok(match read.lost + sent.complaints {
+        0 => Outcome::Done,
+        _ => Outcome::Lossy,
+    })
+}
+
+/// Prints what was sent.
+fn say(
+    global: &Global,
+    remote: &Remote,
+    (read, sent): (&Read, &Sent),
+    took: Duration,
+) -> Result<()> {
+    let secs = took.as_secs_f64();
     if global.json {
         super::print(&format!(
             "{}\n",
@@ -158,10 +172,7 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
             sent.data_secs
         );
     }
-    Ok(match read.lost + sent.complaints {
-        0 => Outcome::Done,
-        _ => Outcome::Lossy,
-    })
+    Ok(())
 }
 
 /// Reads the log and hands its lines over, until it ends or nobody takes them.

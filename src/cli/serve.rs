@@ -165,15 +165,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     // After the state, which may be another daemon's: a recording that is replaced is gone.
     let recorder = recording.map(Recorder::start).transpose()?;
     settings.hub.recorder = recorder.as_ref().map(Recorder::handle);
-    let mut builder = tokio::runtime::Builder::new_multi_thread();
-    if global.threads > 0 {
-        builder.worker_threads(global.threads);
-    }
-    let runtime = builder
-        .thread_name("strapd-serve")
-        .enable_all()
-        .build()
-        .map_err(|e| Error::usage(format!("--threads {}: {e}", global.threads)))?;
+    let runtime = runtime(global.threads)?;
     let has_stdin = args.sources.iter().any(|s| s == "-");
     let outcome = runtime.block_on(serve(settings, has_stdin, (state, calibrations)));
     // A thread that waits for standard input would otherwise be waited for.
@@ -195,6 +187,19 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
             done
         }
     })
+}
+
+/// Threads for so many sensors at once; 0: as many as there are cores.
+fn runtime(threads: usize) -> Result<tokio::runtime::Runtime> {
+    let mut builder = tokio::runtime::Builder::new_multi_thread();
+    if threads > 0 {
+        builder.worker_threads(threads);
+    }
+    builder
+        .thread_name("strapd-serve")
+        .enable_all()
+        .build()
+        .map_err(|e| Error::usage(format!("--threads {threads}: {e}")))
 }
 
 async fn serve(

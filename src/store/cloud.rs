@@ -2,6 +2,8 @@
 //!
 //! Credentials are those of the environment, as each cloud's own tools take them. Requests go by our own client,
 //! which follows no redirect: a signature is for one host.
+//!
+//! Long because the client is here, too: what it saw of an answer is what a fault is told by.
 
 use super::answer::{Part, Reply, Version};
 use super::client::{self, innermost};

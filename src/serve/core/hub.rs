@@ -4,6 +4,9 @@
 //! samples are of, runs decode -> condition -> propagate -> encode on it, and leaves the bytes in
 //! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
 //! order is that of its lock.
+//!
+//! Long because the way of a run goes through all its locks, sensors and clients, and their order is seen only where it
+//! stands together; what needs no lock of both is in the files below.
 
 mod announce;
 mod back_pressure;

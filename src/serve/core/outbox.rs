@@ -3,6 +3,8 @@
 //! A stage of its own because this is where a slow reader stops being anybody else's matter: its
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
+//!
+//! Long because all of it is under one lock: what is queued, what gives way and what is owed agree at every moment.
 
 use super::last::Last;
 use crate::serve::protocol::chunk::{Chunk, Dropped, Encode, MAX_QUEUED, NOTE};

@@ -3,6 +3,9 @@
 //! The estimator is the one of a replay; what differs is decided here: the method needs no later
 //! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
 //! come and go ([`run`]).
+//!
+//! Long because a sensor is one state: who continues it, which sample is its next and what is known of it are read from the
+//! same fields. What is decided without them is in the files below.
 
 pub(super) mod attitude_now;
 mod intervals;

@@ -80,58 +80,94 @@ pub(in crate::serve) async fn keep(
 
 /// Listens to one connection. Returns why it ended, `None` when the daemon ends.
 async fn converse(
-    mut link: Link,
+    link: Link,
     source: &Source,
     outgoing: &Outgoing,
     hub: &Arc<Hub>,
     running: &mut Running,
 ) -> Option<String> {
     let side = Side::source(source.id.clone(), source.decoder(hub.decode_options()));
-    let mut session = Session::with(hub, source.name.clone(), side);
-    let mut bytes = Vec::new();
-    let mut asked = source.protocol == Protocol::Strapd;
-    let mut asked_again = false;
-    let is_web = matches!(source.remote, Remote::WebSocket { .. });
-    let mut flood = Flood::default();
-    let mut first = Vec::new();
-    if let (Some(token), false) = (&source.token, is_web) {
-        first.push(serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string());
-    }
-    if asked {
-        first.push(RATES.to_owned());
-    }
-    for line in first {
-        if let Err(why) = link.send(&line).await {
-            return Some(why.to_string());
+    let mut talk = Talk {
+        link,
+        source,
+        outgoing,
+        hub,
+        session: Session::with(hub, source.name.clone(), side),
+        bytes: Vec::new(),
+        asked: source.protocol == Protocol::Strapd,
+        asked_again: false,
+        flood: Flood::default(),
+    };
+    talk.go_on(running).await.err()
+}
+
+/// Conversation with a peer.
+struct Talk<'c> {
+    link: Link,
+    source: &'c Source,
+    outgoing: &'c Outgoing,
+    hub: &'c Arc<Hub>,
+    session: Session,
+    /// Bytes heard last.
+    bytes: Vec<u8>,
+    /// Whether samples were asked for, and attitudes because it has none.
+    asked: bool,
+    asked_again: bool,
+    flood: Flood,
+}
+
+impl Talk<'_> {
+    /// Converses until the daemon ends.
+    ///
+    /// # Errors
+    /// Why it ended before.
+    async fn go_on(&mut self, running: &mut Running) -> Result<(), String> {
+        self.introduce().await?;
+        loop {
+            let heard = tokio::select! {
+                heard = next(&mut self.link, &mut self.bytes, &mut self.flood) => heard,
+                () = running.asked() => {
+                    self.last_read().await;
+                    return Ok(());
+                }
+            };
+            let ended = self.hear(heard).await;
+            self.answer().await?;
+            match self.session.end() {
+                Some(End::TooManyErrors) => return Err("too many bad lines in a row".to_owned()),
+                Some(End::Unauthorised) => return Err("unauthorised".to_owned()),
+                Some(End::NoObject) => return Err("it speaks something else".to_owned()),
+                None => {}
+            }
+            if let Some(why) = ended {
+                return Err(why);
+            }
+            self.flood.wait(self.hub).await;
         }
     }
-    loop {
-        let next = async {
-            let there = link.read(&mut bytes).now_or_never();
-            flood.message(there.is_some(), bytes.len());
-            match there {
-                Some(heard) => heard,
-                None => link.read(&mut bytes).await,
-            }
-        };
-        let heard = tokio::select! {
-            heard = next => heard,
-            () = running.asked() => {
-                // What has arrived is still taken.
-                let rest = async {
-                    while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
-                        link.read(&mut bytes).now_or_never()
-                    {
-                        take(&mut session, &heard, &bytes, outgoing).await;
-                    }
-                };
-                let _ = timeout(hub.limits().drain / 2, rest).await;
-                return None;
-            }
-        };
-        let ended = match heard {
+
+    async fn say(&mut self, line: &str) -> Result<(), String> {
+        self.link.send(line).await.map_err(|why| why.to_string())
+    }
+
+    /// Shows the token, where the connection itself has not, and asks for samples.
+    async fn introduce(&mut self) -> Result<(), String> {
+        let is_web = matches!(self.source.remote, Remote::WebSocket { .. });
+        if let (Some(token), false) = (&self.source.token, is_web) {
+            let line = serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string();
+            self.say(&line).await?;
+        }
+        if self.asked {
+            self.say(RATES).await?;
+        }
+        Ok(())
+    }
+
+    /// Takes what was heard. Returns why nothing more comes.
+    async fn hear(&mut self, heard: io::Result<Heard>) -> Option<String> {
+        match heard {
             Ok(heard) => {
-                take(&mut session, &heard, &bytes, outgoing).await;
+                take(&mut self.session, &heard, &self.bytes, self.outgoing).await;
                 match heard {
                     Heard::Bytes | Heard::Message => None,
                     Heard::Closed(None) => Some("the peer has closed the connection".to_owned()),
@@ -140,44 +176,59 @@ async fn converse(
             }
             Err(why) if why.kind() == io::ErrorKind::Interrupted => None,
             Err(why) => Some(why.to_string()),
+        }
+    }
+
+    /// The daemon ends: what has arrived is still taken.
+    async fn last_read(&mut self) {
+        let drain = self.hub.limits().drain;
+        let rest = async {
+            while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
+                self.link.read(&mut self.bytes).now_or_never()
+            {
+                take(&mut self.session, &heard, &self.bytes, self.outgoing).await;
+            }
         };
-        for event in session.events() {
+        let _ = timeout(drain / 2, rest).await;
+    }
+
+    /// Answers what the peer says about itself and about what it was asked for.
+    async fn answer(&mut self) -> Result<(), String> {
+        for event in self.session.events() {
             match event {
-                Event::Greeted(run) if run == hub.session() => {
-                    return Some("is this daemon itself".to_owned());
+                Event::Greeted(run) if run == self.hub.session() => {
+                    return Err("is this daemon itself".to_owned());
                 }
                 Event::Greeted(_) => {
-                    if source.protocol == Protocol::Auto
-                        && !std::mem::replace(&mut asked, true)
-                        && let Err(why) = link.send(RATES).await
-                    {
-                        return Some(why.to_string());
+                    let is_open = self.source.protocol == Protocol::Auto;
+                    if is_open && !std::mem::replace(&mut self.asked, true) {
+                        self.say(RATES).await?;
                     }
                 }
                 Event::Complained(what)
-                    if asked && !asked_again && what.starts_with("bad_watch") =>
+                    if self.asked && !self.asked_again && what.starts_with("bad_watch") =>
                 {
-                    asked_again = true;
-                    if let Err(why) = link.send(ATTITUDES).await {
-                        return Some(why.to_string());
-                    }
+                    self.asked_again = true;
+                    self.say(ATTITUDES).await?;
                 }
-                Event::Complained(what) => outgoing.complain(&what),
+                Event::Complained(what) => self.outgoing.complain(&what),
                 Event::Dropped(n) => {
-                    outgoing.complain(&format!("we were too slow for {n} of its attitudes"));
+                    let what = format!("we were too slow for {n} of its attitudes");
+                    self.outgoing.complain(&what);
                 }
             }
         }
-        match session.end() {
-            Some(End::TooManyErrors) => return Some("too many bad lines in a row".to_owned()),
-            Some(End::Unauthorised) => return Some("unauthorised".to_owned()),
-            Some(End::NoObject) => return Some("it speaks something else".to_owned()),
-            None => {}
-        }
-        if ended.is_some() {
-            return ended;
-        }
-        flood.wait(hub).await;
+        Ok(())
+    }
+}
+
+/// Returns what is heard next: what is there already, or what comes.
+async fn next(link: &mut Link, bytes: &mut Vec<u8>, flood: &mut Flood) -> io::Result<Heard> {
+    let there = link.read(bytes).now_or_never();
+    flood.message(there.is_some(), bytes.len());
+    match there {
+        Some(heard) => heard,
+        None => link.read(bytes).await,
     }
 }
 

@@ -8,11 +8,13 @@ use crate::serve::core::read_buffer::{now, with_read_buffer};
 use crate::serve::core::session::Session;
 use crate::serve::core::viewer::Viewer;
 use crate::serve::edge::http::connection::Connection;
-use crate::serve::guard::places::Kind;
+use crate::serve::guard::places::{Kind, Place};
+use crate::serve::guard::shutdown::Running;
 use crate::serve::protocol::foxglove::frames::{self, Framed};
 use crate::serve::protocol::wire;
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
 use bytes::Bytes;
+use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, Stream, StreamExt};
 use memchr::memchr_iter;
 use std::collections::VecDeque;
@@ -24,6 +26,7 @@ use std::task::Poll;
 use std::time::Duration;
 use strapd_recording::decode::packed;
 use tokio::task::yield_now;
+use tokio::time::error::Elapsed;
 use tokio::time::{Instant, MissedTickBehavior, interval_at, sleep, timeout};
 
 /// Longest message that is read: a line that is too long is still answered, up to here.
@@ -39,6 +42,9 @@ const LAST_WORDS: Duration = Duration::from_millis(250);
 /// Attitudes taken from the outbox at once.
 const TAKE: usize = 64 << 10;
 
+/// Reason for which we ended a conversation; `None`: it ended by itself.
+type Reason = Option<&'static str>;
+
 /// Serves one WebSocket to the end of its conversation.
 ///
 /// `foxglove`: it speaks Foxglove's protocol, and whether that which knows playback.
@@ -48,12 +54,11 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         peer,
         trusted,
         is_own_page,
-        mut running,
+        running,
         place,
         ..
     } = connection;
-    let limits = *hub.limits();
-    let mut session = match foxglove {
+    let session = match foxglove {
         None => Talk::Lines(Box::new(
             Session::new(&hub, peer, trusted).of_own_page(is_own_page),
         )),
@@ -61,90 +66,187 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
     };
     let client = session.client().clone();
     place.serves(client.clone());
-    let mut has_place = session.is_authorised();
-    let (mut sink, mut stream) = socket.split();
+    let (mut sink, stream) = socket.split();
     let closing = AtomicBool::new(false);
+    let mut reading = Reading {
+        has_place: session.is_authorised(),
+        session,
+        stream,
+        running,
+        hub: &hub,
+        place: &place,
+        opened: Instant::now(),
+        flood: Flood::default(),
+    };
+    let writing = Writing {
+        sink: &mut sink,
+        hub: &hub,
+        client: &client,
+        closing: &closing,
+        is_foxglove: foxglove.is_some(),
+    };
+    let drain = hub.limits().drain;
+    let mut writer = Box::pin(writing.write_on());
+    let close = || {
+        closing.store(true, Ordering::Release);
+        client.outbox.nudge();
+    };
+    let reason = tokio::select! {
+        () = place.lost() => {
+            client.outbox.reply(wire::error(&place.made_room(), 0, &[], 0));
+            close();
+            // It waited for nothing, so that this finds room, or it is owed none.
+            let _ = timeout(LAST_WORDS, &mut writer).await;
+            Some("others needed its place")
+        }
+        reason = reading.read_on() => {
+            close();
+            reason.or(timeout(drain, &mut writer).await.ok().flatten())
+        }
+        reason = &mut writer => reason,
+    };
+    drop(writer);
+    drop(reading);
+    let _ = timeout(drain, sink.close()).await;
+    if let Some(reason) = reason {
+        count(&hub.counters.closed, 1);
+        tracing::debug!("{}: closed: {reason}", client.peer);
+    }
+}
 
-    let reader = async {
-        let opened = Instant::now();
-        let mut flood = Flood::default();
+/// Reading side of a conversation.
+struct Reading<'c> {
+    session: Talk,
+    stream: SplitStream<WebSocket>,
+    running: Running,
+    hub: &'c Hub,
+    place: &'c Place,
+    /// Whether it has the place of one who converses.
+    has_place: bool,
+    opened: Instant,
+    flood: Flood,
+}
+
+impl Reading<'_> {
+    async fn read_on(&mut self) -> Reason {
         loop {
-            let patience = if session.has_spoken() {
-                limits.ping * 2 + limits.ping / 3
-            } else {
-                limits.first_line.saturating_sub(opened.elapsed())
-            };
-            let next = async {
-                let there = ready(&mut stream).await;
-                let said = there.as_ref().and_then(|m| payload(m.as_ref().ok()?));
-                flood.message(there.is_some(), said.map_or(0, |(bytes, _)| bytes.len()));
-                match there {
-                    Some(message) => Ok(Some(message)),
-                    None => timeout(patience, stream.next()).await,
-                }
-            };
+            let patience = self.patience();
             let message = tokio::select! {
-                message = next => message,
-                () = running.asked() => {
-                    // What has arrived is still taken.
-                    let rest = async {
-                        while let Some(Ok(message)) = ready(&mut stream).await {
-                            session.take_all(&message, &hub).await;
-                        }
-                    };
-                    let _ = timeout(limits.drain / 2, rest).await;
-                    running.has_read();
-                    running.asked_to_send().await;
+                message = next(&mut self.stream, &mut self.flood, patience) => message,
+                () = self.running.asked() => {
+                    self.last_read().await;
                     return None;
                 }
             };
             match message {
                 Err(_) => return Some("nothing was heard from it for too long"),
-                Ok(None | Some(Err(_))) => return None,
-                Ok(Some(Ok(Message::Close(_)))) => return None,
+                Ok(None | Some(Err(_) | Ok(Message::Close(_)))) => return None,
                 Ok(Some(Ok(message))) => {
-                    session.take_all(&message, &hub).await;
+                    self.session.take_all(&message, self.hub).await;
                     if payload(&message).is_some() {
-                        place.heard();
+                        self.place.heard();
                     }
                 }
             }
-            if session.is_authorised() && !has_place {
-                has_place = true;
-                if let Err(fault) = place.become_of(Kind::Served, true) {
-                    hub.turned_away(&fault);
-                    client.outbox.reply(wire::error(&fault, 0, &[], 0));
-                    return Some("there is no place for it");
-                }
+            if !self.takes_its_place() {
+                return Some("there is no place for it");
             }
-            flood.wait(&hub).await;
-            if session.is_over() {
-                if let Some((delay, words)) = session.last_words() {
-                    tokio::select! {
-                        () = sleep(delay) => {}
-                        () = running.asked() => {}
-                    }
-                    client.outbox.reply(words);
-                }
+            self.flood.wait(self.hub).await;
+            if self.session.is_over() {
+                self.say_last_words().await;
                 return Some("bad lines or no token");
             }
         }
-    };
+    }
 
-    let writer = async {
+    /// Time within which something is to be heard.
+    fn patience(&self) -> Duration {
+        let limits = self.hub.limits();
+        match self.session.has_spoken() {
+            true => limits.ping * 2 + limits.ping / 3,
+            false => limits.first_line.saturating_sub(self.opened.elapsed()),
+        }
+    }
+
+    /// The daemon ends: what has arrived is still taken.
+    async fn last_read(&mut self) {
+        let rest = async {
+            while let Some(Ok(message)) = ready(&mut self.stream).await {
+                self.session.take_all(&message, self.hub).await;
+            }
+        };
+        let _ = timeout(self.hub.limits().drain / 2, rest).await;
+        self.running.has_read();
+        self.running.asked_to_send().await;
+    }
+
+    /// Whether there is a place for it, once it has shown that it may converse.
+    fn takes_its_place(&mut self) -> bool {
+        if !self.session.is_authorised() || std::mem::replace(&mut self.has_place, true) {
+            return true;
+        }
+        let Err(fault) = self.place.become_of(Kind::Served, true) else {
+            return true;
+        };
+        self.hub.turned_away(&fault);
+        let words = wire::error(&fault, 0, &[], 0);
+        self.session.client().outbox.reply(words);
+        false
+    }
+
+    async fn say_last_words(&mut self) {
+        if let Some((delay, words)) = self.session.last_words() {
+            tokio::select! {
+                () = sleep(delay) => {}
+                () = self.running.asked() => {}
+            }
+            self.session.client().outbox.reply(words);
+        }
+    }
+}
+
+/// The next message: what is there already, or what comes in time.
+async fn next(
+    stream: &mut SplitStream<WebSocket>,
+    flood: &mut Flood,
+    patience: Duration,
+) -> Result<Option<Result<Message, axum::Error>>, Elapsed> {
+    let there = ready(stream).await;
+    let said = there.as_ref().and_then(|m| payload(m.as_ref().ok()?));
+    flood.message(there.is_some(), said.map_or(0, |(bytes, _)| bytes.len()));
+    match there {
+        Some(message) => Ok(Some(message)),
+        None => timeout(patience, stream.next()).await,
+    }
+}
+
+/// Writing side of a conversation.
+struct Writing<'c> {
+    sink: &'c mut SplitSink<WebSocket, Message>,
+    hub: &'c Hub,
+    client: &'c Client,
+    /// Nothing more is read: what it is owed is the last.
+    closing: &'c AtomicBool,
+    is_foxglove: bool,
+}
+
+impl Writing<'_> {
+    async fn write_on(self) -> Reason {
+        let limits = self.hub.limits();
+        let outbox = &self.client.outbox;
         let mut pings = interval_at(Instant::now() + limits.ping, limits.ping);
         pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut parts = VecDeque::new();
         loop {
-            let attitudes = client.outbox.take(TAKE, &mut parts);
+            let attitudes = outbox.take(TAKE, &mut parts);
             if parts.is_empty() {
-                if closing.load(Ordering::Acquire) && !client.outbox.owes_answer() {
+                if self.closing.load(Ordering::Acquire) && !outbox.owes_answer() {
                     return None;
                 }
                 tokio::select! {
-                    () = client.outbox.filled() => {}
+                    () = outbox.filled() => {}
                     _ = pings.tick() => {
-                        let ping = sink.send(Message::Ping(Bytes::new()));
+                        let ping = self.sink.send(Message::Ping(Bytes::new()));
                         if !matches!(timeout(limits.no_progress, ping).await, Ok(Ok(()))) {
                             return Some("it took nothing for too long");
                         }
@@ -152,69 +254,47 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
                 }
                 continue;
             }
-            if client.outbox.full().is_some() {
+            if outbox.full().is_some() {
                 return Some("it does not read the replies to what it sends");
             }
             let bytes: usize = parts.iter().map(Bytes::len).sum();
-            let sending = async {
-                for part in parts.drain(..) {
-                    match foxglove {
-                        None if packed::is_packed(&part) => {
-                            sink.feed(Message::Binary(part)).await?;
-                        }
-                        None => {
-                            for line in lines(&part) {
-                                sink.feed(text(line)).await?;
-                            }
-                        }
-                        Some(_) => {
-                            for message in frames::messages(&part) {
-                                sink.feed(match message {
-                                    Framed::Text(line) => text(line),
-                                    Framed::Binary(bytes) => Message::Binary(bytes),
-                                })
-                                .await?;
-                            }
-                        }
-                    }
-                }
-                sink.flush().await
-            };
+            let sending = send(self.sink, &mut parts, self.is_foxglove);
             match timeout(limits.no_progress, sending).await {
                 Ok(Ok(())) => {
-                    client.outbox.written(attitudes);
-                    count(&hub.counters.bytes_out, bytes);
+                    outbox.written(attitudes);
+                    count(&self.hub.counters.bytes_out, bytes);
                 }
                 Ok(Err(_)) => return None,
                 Err(_) => return Some("it took nothing for too long"),
             }
         }
-    };
-
-    let mut writer = Box::pin(writer);
-    let reason = tokio::select! {
-        () = place.lost() => {
-            client.outbox.reply(wire::error(&place.made_room(), 0, &[], 0));
-            closing.store(true, Ordering::Release);
-            client.outbox.nudge();
-            // It waited for nothing, so that this finds room, or it is owed none.
-            let _ = timeout(LAST_WORDS, &mut writer).await;
-            Some("others needed its place")
-        }
-        reason = reader => {
-            closing.store(true, Ordering::Release);
-            client.outbox.nudge();
-            reason.or(timeout(limits.drain, &mut writer).await.ok().flatten())
-        }
-        reason = &mut writer => reason,
-    };
-    drop(writer);
-    drop(session);
-    let _ = timeout(limits.drain, sink.close()).await;
-    if let Some(reason) = reason {
-        count(&hub.counters.closed, 1);
-        tracing::debug!("{}: closed: {reason}", client.peer);
     }
+}
+
+/// Sends parts of an outbox, each message of its own kind.
+async fn send(
+    sink: &mut SplitSink<WebSocket, Message>,
+    parts: &mut VecDeque<Bytes>,
+    is_foxglove: bool,
+) -> Result<(), axum::Error> {
+    for part in parts.drain(..) {
+        if is_foxglove {
+            for message in frames::messages(&part) {
+                sink.feed(match message {
+                    Framed::Text(line) => text(line),
+                    Framed::Binary(bytes) => Message::Binary(bytes),
+                })
+                .await?;
+            }
+        } else if packed::is_packed(&part) {
+            sink.feed(Message::Binary(part)).await?;
+        } else {
+            for line in lines(&part) {
+                sink.feed(text(line)).await?;
+            }
+        }
+    }
+    sink.flush().await
 }
 
 /// Conversation with a client.
