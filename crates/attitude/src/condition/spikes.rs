@@ -97,7 +97,7 @@ struct Past {
 /// A run of samples against its neighbours.
 struct Run {
     samples: usize,
-    /// Before and behind it.
+    /// Neighbours: the one before and the one behind.
     ends: (Vector3<f64>, Vector3<f64>),
     /// Least distance from the line, rad/s.
     distance: f64,

@@ -84,12 +84,12 @@ fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
     names
 }
 
-/// What is known of a file before its header.
+/// Facts about a file before its header.
 #[derive(Default)]
 struct File<'f> {
-    /// Its name, without the ending.
+    /// Name, without the ending.
     stem: &'f str,
-    /// What is looked for in it.
+    /// Purpose of its reading.
     wanted: Wanted,
     maker: Maker,
 }

@@ -27,7 +27,7 @@ impl Whose {
     }
 }
 
-/// What the first rows say in one column.
+/// Contents of one column in the first rows.
 struct Values {
     distinct: usize,
     rows: usize,
