@@ -45,6 +45,7 @@ mod histogram;
 mod memory;
 mod order;
 pub(crate) mod rails;
+mod repairs;
 mod report;
 mod settings;
 mod spacing;
@@ -63,10 +64,11 @@ pub use clock::{
 };
 pub use histogram::Histogram;
 pub use memory::Memory;
+pub use repairs::{SpikePolicy, StampRepair};
 pub use report::{ClockSet, FirstBad, GAPS_KEPT, Gap, Gaps, Report, Wraps};
 pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};
-pub use settings::{OnGap, Settings, SettingsError, StampRepair};
-pub use spikes::{SpikeCount, SpikePolicy};
+pub use settings::{OnGap, Settings, SettingsError};
+pub use spikes::SpikeCount;
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
 use clock::{BatchLine, ClockSteps, IndexClock, Turns};

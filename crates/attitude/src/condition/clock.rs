@@ -17,7 +17,7 @@ pub(super) use steps::ClockSteps;
 pub use unwrap::Period;
 pub(super) use unwrap::Turns;
 
-use super::settings::StampRepair;
+use super::repairs::StampRepair;
 use crate::diagnostic::Diagnostic;
 use crate::record::{Nanos, RawSample};
 use crate::setting::{RATE_HZ, TIME};
@@ -318,7 +318,8 @@ mod tests {
     #[test]
     fn stamps_that_no_sensor_has_give_way_to_the_log_time() {
         // Seconds that stay, nanoseconds that count seconds; microseconds, and picoseconds, for nanoseconds.
-        let cases: [(fn(i64) -> i64, &str); 3] = [
+        type Warp = fn(i64) -> i64;
+        let cases: [(Warp, &str); 3] = [
             (|t| 1_751_654_798 + t / 1_000_000_000 * 1000, "stands still"),
             (|t| 7_000_000 + t / 1000, "1000 times larger"),
             (|t| 7_000_000 + t * 1000, "1000 times smaller"),

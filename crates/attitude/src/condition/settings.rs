@@ -4,7 +4,7 @@
 //! before the first sample, and the hot path needs no checks.
 
 use super::clock::{BatchRate, Clock};
-use super::spikes::SpikePolicy;
+use super::repairs::{SpikePolicy, StampRepair};
 use crate::frames::{AxisMap, Body, Dcm, Sensor};
 use crate::quaternion::BodyRate;
 use crate::record::{GyroUnit, SampleKind};
@@ -96,28 +96,6 @@ pub struct Settings {
     pub has_arrival: bool,
     /// The rate of samples that were stamped when their batch came, where a pass over the recording found one.
     pub batches: Option<BatchRate>,
-}
-
-/// Treatment of stamps whose clock does not run on evenly (`--stamps`).
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum StampRepair {
-    /// Stamps go on where their counter wraps, and where their clock was set while that of the recorder went on; those
-    /// of batches are spread; those that stand still give way to the log time.
-    #[default]
-    Auto,
-    /// Stamps as recorded.
-    AsRecorded,
-}
-
-impl StampRepair {
-    /// The name used by `--stamps`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            StampRepair::Auto => "auto",
-            StampRepair::AsRecorded => "as-recorded",
-        }
-    }
 }
 
 impl Default for Settings {

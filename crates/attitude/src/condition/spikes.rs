@@ -7,30 +7,10 @@
 //! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), it is off.
 
 use super::gate::{Entry, NO_ACCEL, finite_accel};
+use super::repairs::SpikePolicy;
 use super::settings::Settings;
 use crate::record::{Nanos, SampleKind, Status};
 use nalgebra::Vector3;
-
-/// Treatment of spikes.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
-pub enum SpikePolicy {
-    /// Replace them by the line between their neighbours.
-    #[default]
-    Repair,
-    /// Leave them as recorded.
-    Keep,
-}
-
-impl SpikePolicy {
-    /// The name used by `--spikes`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            SpikePolicy::Repair => "repair",
-            SpikePolicy::Keep => "keep",
-        }
-    }
-}
 
 /// Spikes that were repaired.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]

@@ -246,7 +246,8 @@ mod tests {
 
     #[test]
     fn speeds_and_their_verdicts_are_those_of_the_reference() {
-        let cases: [(fn(i64) -> i64, SpeedVerdict, f64); 6] = [
+        type Warp = fn(i64) -> i64;
+        let cases: [(Warp, SpeedVerdict, f64); 6] = [
             (|e| e + e * 8 / 100_000, SpeedVerdict::Good, 1.000_076_36),
             (|e| e + e / 100, SpeedVerdict::Warning, 1.009_998_09),
             (|e| e / 2, SpeedVerdict::Wrong, 0.500_000_411),

@@ -86,7 +86,7 @@ fn a_packed_attitude_is_these_bytes() {
 
 #[test]
 fn status_bits_mean_what_the_protocol_says() {
-    let page = include_str!("../../../../docs/protocol.md");
+    let page = include_str!("../../../../../docs/protocol.md");
     let row = |bit: u32, name: &str| format!("| {bit} | `{name}` |");
     for bit in 0..16 {
         let names: Vec<_> = Status(1 << bit).names().collect();

@@ -3,8 +3,11 @@
 use super::*;
 use strapd_attitude::record::Nanos;
 
+type SensorAndStamp = (Option<String>, Option<i64>);
+type Cell = fn(usize) -> String;
+
 /// Sensor and stamp of each row, and what its reader is told.
-fn rows(text: &str, columns: Option<&str>) -> (Vec<(Option<String>, Option<i64>)>, String) {
+fn rows(text: &str, columns: Option<&str>) -> (Vec<SensorAndStamp>, String) {
     let options = Options {
         columns: columns.map(|columns| columns.parse().unwrap()),
         ..Options::default()
@@ -69,7 +72,7 @@ fn a_column_that_names_the_sensor_keeps_bodies_apart() {
 #[test]
 fn a_running_number_and_a_measurement_name_no_sensor() {
     let one = vec![String::new(); 60];
-    let cases: [(&str, fn(usize) -> String); 7] = [
+    let cases: [(&str, Cell); 7] = [
         ("id", |n| n.to_string()),
         ("id", |n| (n / 10).to_string()),
         ("device", |n| n.to_string()),
