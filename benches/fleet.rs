@@ -11,7 +11,7 @@ use std::time::Instant;
 use strapd::serve::core::hub::{Hub, Settings};
 use strapd::serve::core::session::{Scratch, Session};
 use strapd::serve::guard::limits::Limits;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::record::Nanos;
 
 /// Samples in all, but for what makes each sensor known.
@@ -58,9 +58,9 @@ fn one(is_aided: bool, sensors: usize) {
         sensors_of_client: OF_ONE,
         ..Limits::default()
     };
-    let plan = Plan {
+    let plan = EstimationSettings {
         aid: if is_aided { Aid::Gravity } else { Aid::None },
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let settings = Settings {
         limits,

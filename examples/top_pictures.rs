@@ -8,7 +8,7 @@
 #![allow(clippy::print_stdout)]
 
 use std::path::Path;
-use strapd::report::plot::{Axis, Chart, Look, Series};
+use strapd::report::plot::{Axis, Chart, Series, SeriesStyle};
 use strapd_attitude::frames::{Body, In, Nav};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::quaternion::Quaternion;
@@ -142,20 +142,25 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
             ..Axis::linear("north, tilted by the view")
         },
         series: vec![
-            line("", outline, Look::Line, 5),
+            line("", outline, SeriesStyle::Line, 5),
             line(
                 "start's angle from the vertical",
                 parallel(Case::SEED_TILT),
-                Look::Dashed,
+                SeriesStyle::Dashed,
                 6,
             ),
             line(
                 "gyro samples, integrated (auto)",
                 locus(&ours, 6),
-                Look::Line,
+                SeriesStyle::Line,
                 1,
             ),
-            line("Euler-angle equations", locus(&angles, 6), Look::Dashed, 0),
+            line(
+                "Euler-angle equations",
+                locus(&angles, 6),
+                SeriesStyle::Dashed,
+                0,
+            ),
         ],
         equal: true,
         size: (860, 640),
@@ -256,7 +261,7 @@ fn error_over_rate() -> Result<Chart, Failure> {
         .iter()
         .map(|(name, _)| Series {
             name: (*name).to_owned(),
-            look: Look::Marked,
+            look: SeriesStyle::Marked,
             ..Series::default()
         })
         .collect();

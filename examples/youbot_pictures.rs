@@ -7,7 +7,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::Path;
-use strapd::report::plot::{Axis, Chart, Look, Series};
+use strapd::report::plot::{Axis, Chart, Series, SeriesStyle};
 use strapd_bodies::youbot::{Arm, JointPath, TableJoints};
 
 fn main() {
@@ -68,7 +68,7 @@ fn workspace() -> Chart {
     let pose = |name: &str, q, color| Series {
         name: name.to_owned(),
         points: skeleton(&arm, q),
-        look: Look::Marked,
+        look: SeriesStyle::Marked,
         color: Some(color),
     };
     Chart {
@@ -79,7 +79,7 @@ fn workspace() -> Chart {
             Series {
                 name: "edge of the reach".to_owned(),
                 points: edge,
-                look: Look::Dots,
+                look: SeriesStyle::Dots,
                 color: Some(5),
             },
             pose("upright: q = 0, 0, 0, 90, 0", [0.0, 0.0, 0.0, 90.0, 0.0], 0),

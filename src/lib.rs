@@ -79,7 +79,7 @@ pub fn main() -> ExitCode {
         |name: &str, f: &mut std::fmt::Formatter<'_>| write!(f, "--{}", name.replace('_', "-"));
     let _ = strapd_attitude::setting::name_settings(as_flag);
     #[cfg(feature = "object-store")]
-    let _ = strapd_recording::elsewhere::reach_by(store::reach);
+    let _ = strapd_recording::remote_object::reach_by(store::reach);
     #[cfg(feature = "object-store")]
     let _ = sink::upload::upload_by(store::upload::WAY);
     let cli = cli::Cli::parse();

@@ -39,7 +39,7 @@ pub mod upload;
 mod web;
 
 use answer::Reply;
-use kept::Kept;
+use kept::CachedObject;
 use patience::Patience;
 use place::Place;
 use std::future::Future;
@@ -47,7 +47,7 @@ use std::io;
 use std::sync::{Arc, OnceLock};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::address::Address;
-use strapd_recording::elsewhere::Found;
+use strapd_recording::remote_object::RemoteSource;
 use tokio::runtime::{Builder, Runtime};
 
 /// Bytes that are asked for first: enough to tell a format.
@@ -57,7 +57,7 @@ const FIRST: u64 = 64 << 10;
 ///
 /// # Errors
 /// It is none, nobody answers, or the answer is no.
-pub fn reach(address: &Address) -> Result<Found, Diagnostic> {
+pub fn reach(address: &Address) -> Result<RemoteSource, Diagnostic> {
     reach_with(address, Patience::default())
 }
 
@@ -65,7 +65,7 @@ pub fn reach(address: &Address) -> Result<Found, Diagnostic> {
 ///
 /// # Errors
 /// As [`reach`].
-pub fn reach_with(address: &Address, patience: Patience) -> Result<Found, Diagnostic> {
+pub fn reach_with(address: &Address, patience: Patience) -> Result<RemoteSource, Diagnostic> {
     let runtime = runtime().map_err(|e| Diagnostic::new(format!("cannot start threads: {e}")))?;
     let place = Arc::new(Place::of(address, &patience)?);
     let asked = Arc::clone(&place);
@@ -76,7 +76,7 @@ pub fn reach_with(address: &Address, patience: Patience) -> Result<Found, Diagno
         .unwrap_or_else(|| Err(Diagnostic::new("the request was given up").into()))
         .map_err(|fault| fault.told(|status| place.help(status)))?;
     Ok(match reply {
-        Reply::All { size, body } => Found::Stream(Box::new(once::Once::new(
+        Reply::All { size, body } => RemoteSource::Stream(Box::new(once::Once::new(
             runtime.handle(),
             body,
             size,
@@ -84,8 +84,8 @@ pub fn reach_with(address: &Address, patience: Patience) -> Result<Found, Diagno
         ))),
         Reply::Part(part) => {
             let handle = runtime.handle().clone();
-            let kept = Kept::new(handle, place, part, patience).map_err(no_room)?;
-            Found::Object(Arc::new(kept))
+            let kept = CachedObject::new(handle, place, part, patience).map_err(no_room)?;
+            RemoteSource::Object(Arc::new(kept))
         }
     })
 }

@@ -2,7 +2,7 @@
 
 use crate::contenders::{Contender, OF_INCREMENTS, OF_RATES};
 use crate::runs::{Failure, MARGIN, Run, arcsec};
-use strapd::report::plot::{Axis, Chart, Look, Series};
+use strapd::report::plot::{Axis, Chart, Series, SeriesStyle};
 use strapd_attitude::record::SampleKind;
 
 /// Amount that is computed: `Whole` for publication, `Quick` to see that it runs.
@@ -83,7 +83,7 @@ fn lines(
             Ok(Series {
                 name: words.to_owned(),
                 points,
-                look: Look::Marked,
+                look: SeriesStyle::Marked,
                 // The same in every picture.
                 color: Some(i),
             })

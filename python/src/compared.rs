@@ -6,7 +6,8 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use strapd_attitude::compare::{
-    self as comparing, Align, Consistency, ErrorStats, Known, Stamped, WithinSigma, consistency,
+    self as comparing, Align, Consistency, ErrorStats, Stamped, UncertainAttitude, WithinSigma,
+    consistency,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::frames::{Body, Nav};
@@ -120,7 +121,11 @@ fn in_flu(from: Convention, wxyz: [f64; 4]) -> Quaternion<Nav, Body> {
     )
 }
 
-fn known(estimate: &[Stamped], cov: &Rows<'_>, from: Convention) -> PyResult<Vec<Known>> {
+fn known(
+    estimate: &[Stamped],
+    cov: &Rows<'_>,
+    from: Convention,
+) -> PyResult<Vec<UncertainAttitude>> {
     if cov.shape() != [estimate.len(), 6] {
         return Err(argument(format!(
             "cov: of shape {:?} for {} attitudes",
@@ -134,7 +139,7 @@ fn known(estimate: &[Stamped], cov: &Rows<'_>, from: Convention) -> PyResult<Vec
     let (rows, _) = flat.as_chunks::<6>();
     let all = estimate.iter().zip(rows).map(|((stamp, q_nb), upper)| {
         let covariance = AttitudeCovariance::from_upper(*upper);
-        Known {
+        UncertainAttitude {
             stamp: *stamp,
             q_nb: *q_nb,
             covariance: match from {

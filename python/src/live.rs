@@ -10,7 +10,7 @@ use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, at_once};
+use strapd_attitude::estimate::{EstimationSettings, Estimator, Meaning, Prepared, at_once};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, Nanos, RawSample};
 use strapd_replay::pipeline::samples::so_far;
@@ -19,12 +19,12 @@ use strapd_replay::pipeline::samples::so_far;
 const BLOCK: usize = 4096;
 
 /// An attitude as it is told at once: `(t, (w, x, y, z))`.
-type Told = (i64, (f64, f64, f64, f64));
+type AttitudeTuple = (i64, (f64, f64, f64, f64));
 
 /// A live estimator of one sensor.
 #[pyclass(subclass, module = "strapd._strapd")]
 pub struct Live {
-    plan: Plan,
+    plan: EstimationSettings,
     meaning: Meaning,
     running: Option<(Estimator, Prepared)>,
     last: Option<AttitudeSample>,
@@ -146,7 +146,7 @@ impl Live {
         acc: Option<&Bound<'_, PyAny>>,
         mag: Option<&Bound<'_, PyAny>>,
         t: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Option<Told>> {
+    ) -> PyResult<Option<AttitudeTuple>> {
         self.check_open(py)?;
         let gyr = vector("gyr", gyr)?;
         let acc = acc.map(|v| vector("acc", v)).transpose()?;

@@ -18,7 +18,7 @@ use strapd_replay::findings::{Finding, Severity, findings};
 use strapd_replay::info::Overview;
 use strapd_replay::pipeline::check;
 use strapd_replay::pipeline::inspection::look;
-use strapd_replay::pipeline::logged;
+use strapd_replay::pipeline::opening;
 
 /// Contents of the log at `path`: JSON, and warnings.
 #[pyfunction]
@@ -27,7 +27,7 @@ pub fn info(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {
     let work = move || {
         let pool = pool(0)?;
         let options = Options::default();
-        let input = logged::open(&path)?;
+        let input = opening::open(&path)?;
         let log = Recording::told_apart(&input, None, &options, &pool)?;
         let looks = look(&log, None, &options, &pool)?;
         let info = Overview {
@@ -54,7 +54,7 @@ pub fn check_log(
 ) -> PyResult<(String, Vec<String>)> {
     let work = move || {
         let pool = pool(0)?;
-        let input = logged::open(&path)?;
+        let input = opening::open(&path)?;
         let checked = check::check(&input, topic.as_deref(), &Options::default(), &pool)?;
         let found = findings(&checked);
         let worst = found.iter().map(|f| f.severity).max();

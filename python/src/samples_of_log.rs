@@ -19,12 +19,12 @@ use strapd_recording::Recording;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::topic_reading::TopicReading;
 use strapd_replay::error::{Error, Result};
-use strapd_replay::pipeline::logged;
+use strapd_replay::pipeline::opening;
 
 /// Samples between two looks whether to end.
 const BLOCK: usize = 4096;
 
-struct Found {
+struct LogSamples {
     topic: String,
     columns: RawColumns,
     kind: Option<SampleKind>,
@@ -52,7 +52,7 @@ pub fn read<'py>(
     ))
 }
 
-fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
+fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<LogSamples> {
     let time = match words.text("time").unwrap_or("header") {
         "header" => Time::Header,
         "log" => Time::Log,
@@ -67,7 +67,7 @@ fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
     let selection = words.selection()?;
     let (named, options) = (selection.topic.as_deref(), &selection.decode);
     let pool = pool(words.parsed("threads")?.unwrap_or(0))?;
-    let log = Recording::told_apart(&logged::open(path)?, named, options, &pool)?;
+    let log = Recording::told_apart(&opening::open(path)?, named, options, &pool)?;
     let mut decoders = Decoders::new(options);
     let reading = TopicReading::new(&log, named, &mut decoders)?.with_fields();
     let (mut columns, mut meant) = (RawColumns::new(time), None);
@@ -83,7 +83,7 @@ fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
     if let Some(note) = &reading.note {
         tracing::warn!("{}: {note}", path.display());
     }
-    Ok(Found {
+    Ok(LogSamples {
         topic: reading.name().to_owned(),
         columns,
         kind: meant,

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::estimate::settings::{ROWS, Row, Takes, Value, defaults};
 use strapd_attitude::propagate::Method;
 use strapd_attitude::setting::{RATE_HZ, SAMPLE_KIND, TIME};
@@ -26,7 +26,7 @@ fn keyword(row: &Row) -> Option<&'static str> {
 }
 
 /// The plan that these settings make, checked; `None` is the same as absent.
-pub fn plan(settings: &Bound<'_, PyDict>) -> PyResult<Plan> {
+pub fn plan(settings: &Bound<'_, PyDict>) -> PyResult<EstimationSettings> {
     let known: Vec<&str> = ROWS.iter().filter_map(keyword).chain([FINALS]).collect();
     for name in settings.keys() {
         let name = name.extract::<String>()?;
@@ -53,7 +53,7 @@ pub fn plan(settings: &Bound<'_, PyDict>) -> PyResult<Plan> {
     Ok(plan)
 }
 
-fn put(row: &Row, plan: &mut Plan, value: &Bound<'_, PyAny>) -> PyResult<()> {
+fn put(row: &Row, plan: &mut EstimationSettings, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let (text, numbers, figures);
     let value = if let Takes::Calibration(_) = row.takes {
         Value::Calibration(Arc::new(calibration::read(value)?))

@@ -10,7 +10,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::settings::{ROWS, Takes, Value, defaults};
-use strapd_attitude::estimate::{Plan, SensorCalibration};
+use strapd_attitude::estimate::{EstimationSettings, SensorCalibration};
 use strapd_recording::{Selection, Source};
 use strapd_replay::config::{calibration, selection, take_beside};
 use strapd_replay::error::{Error, Result};
@@ -103,7 +103,7 @@ impl Words {
         Ok(selection)
     }
 
-    fn plan(&self, known: Option<SensorCalibration>) -> Result<Plan> {
+    fn plan(&self, known: Option<SensorCalibration>) -> Result<EstimationSettings> {
         let known = match (known, self.text("calibration")) {
             (None, Some(path)) => Some(read_calibration(Path::new(path))?),
             (known, _) => known,

@@ -9,14 +9,14 @@ use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::config::selection;
 use crate::error::{Error, Result};
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use crate::report::page::Noise;
 use crate::sink::Document;
 use clap::Args;
-use gather::Gathered;
+use gather::AngleSeries;
 use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use strapd_attitude::record::SampleKind;
 use strapd_recording::Input;
@@ -99,7 +99,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     };
     let (plot, csv) = (open(&args.plot)?, open(&args.csv)?);
     let pool = Pool::new(global.threads)?;
-    let input = logged::open(&args.file)?;
+    let input = opening::open(&args.file)?;
     let gathered = gather::gather(&input, (&selection, &plan), gather::CAPACITY, &pool)?;
     let axes = analyse(&gathered).map_err(|what| strapd_recording::Error::Topic {
         path: input.name().to_owned(),
@@ -140,7 +140,11 @@ const FOR_REPORT: usize = 1 << 20;
 ///
 /// # Errors
 /// As [`run`], but for outputs.
-pub(super) fn examined(input: &Input, asked: (&Selection, &Plan), pool: &Pool) -> Result<Noise> {
+pub(super) fn examined(
+    input: &Input,
+    asked: (&Selection, &EstimationSettings),
+    pool: &Pool,
+) -> Result<Noise> {
     let gathered = gather::gather(input, asked, FOR_REPORT, pool)?;
     let fails = |what| strapd_recording::Error::Topic {
         path: input.name().to_owned(),
@@ -163,7 +167,7 @@ pub(super) fn examined(input: &Input, asked: (&Selection, &Plan), pool: &Pool) -
 }
 
 /// The curves and fits of the three axes.
-fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, Diagnostic> {
+fn analyse(gathered: &AngleSeries) -> std::result::Result<Vec<Axis>, Diagnostic> {
     let record = &gathered.record;
     let interval = gathered.interval;
     // Rates were summed in units of the sampling interval.
@@ -200,8 +204,8 @@ fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, Diagnostic> {
 
 impl Allan {
     /// The flags as a plan: what replay's of the same names mean.
-    fn plan(&self) -> Result<Plan> {
-        let mut plan = Plan::default();
+    fn plan(&self) -> Result<EstimationSettings> {
+        let mut plan = EstimationSettings::default();
         self.settings.put(&mut plan, None).map_err(Error::usage)?;
         plan.check().map_err(Error::usage)?;
         Ok(plan)

@@ -16,7 +16,7 @@ use crate::sink::Target;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Plan, Pooled, SensorCalibration};
+use strapd_attitude::estimate::{Aid, EstimationSettings, Pooled, SensorCalibration};
 use strapd_recording::Selection;
 use strapd_recording::Source;
 use strapd_recording::pool::Pool;
@@ -68,7 +68,7 @@ pub fn run(global: &Global, mut args: Calibrate) -> Result<Outcome> {
         bias: None,
         ..known.clone()
     });
-    let plan = Plan {
+    let plan = EstimationSettings {
         calibration: None,
         ..plan
     };
@@ -168,7 +168,7 @@ impl Calibrate {
 fn learned(
     global: &Global,
     log: &str,
-    (selection, plan): (Selection, Plan),
+    (selection, plan): (Selection, EstimationSettings),
     pool: &Pool,
 ) -> Result<(TopicSummary, bool)> {
     let run = ReplayRequest {

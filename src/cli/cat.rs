@@ -8,7 +8,7 @@ use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::config::selection;
 use crate::error::{Error, Result};
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use crate::sink::{RAW_HEADER, push_raw_row};
 use clap::{Args, ValueEnum};
 use std::io::{BufWriter, Write};
@@ -17,10 +17,10 @@ use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::Recording;
-use strapd_recording::elsewhere;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::topic_reading::TopicReading;
+use strapd_recording::remote_object;
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]
@@ -88,7 +88,7 @@ pub enum Format {
 /// The log cannot be read or decoded; stdout cannot be written.
 pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     match args.source.to_str() {
-        Some(text) if Remote::is_meant(text) && elsewhere::meant(text).is_none() => {
+        Some(text) if Remote::is_meant(text) && remote_object::meant(text).is_none() => {
             return url::run(args, text);
         }
         _ => {}
@@ -112,7 +112,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     args.tables.put(&mut options)?;
     let pool = Pool::new(global.threads)?;
     let log = Recording::told_apart(
-        &logged::open(&args.source)?,
+        &opening::open(&args.source)?,
         args.topic.as_deref(),
         &options,
         &pool,

@@ -5,7 +5,7 @@ use super::tables::Tables;
 use super::{Global, Outcome, own_output, print, with_each};
 use crate::error::Result;
 use crate::pipeline::check::{Examination, examine};
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use crate::report::findings::Severity;
 use crate::report::page::FindingRow;
 use clap::Args;
@@ -69,7 +69,7 @@ fn one(
     asked: &Examination<'_>,
     pool: &Pool,
 ) -> Result<(String, Outcome)> {
-    let input = logged::open(file)?;
+    let input = opening::open(file)?;
     let checked = examine(&input, asked, pool, &mut |_| {})?;
     let found = FindingRow::all(&checked, &asked.plan);
     let open = found.iter().filter(|row| row.answered.is_none());

@@ -4,10 +4,10 @@ use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side};
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use crate::report::against;
 use crate::report::page::{STRETCHES, comparison_json};
-use crate::report::plot::{Axis, Chart, Look, Series};
+use crate::report::plot::{Axis, Chart, Series, SeriesStyle};
 use crate::report::summary::significant;
 use crate::report::trace::Traces;
 use crate::sink::Document;
@@ -16,8 +16,8 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use strapd_attitude::compare::{
-    Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Known, Reference, Stamped,
-    compare, consistency, fit_body_axes, fit_constant_bias, for_each_error,
+    Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Reference, Stamped,
+    UncertainAttitude, compare, consistency, fit_body_axes, fit_constant_bias, for_each_error,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
@@ -101,7 +101,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     args.tables.put(&mut options)?;
     let read = |path: &Path, side, topic: &Option<String>| {
         attitude_track::read(
-            &logged::open(path)?,
+            &opening::open(path)?,
             side,
             topic.as_deref(),
             &options,
@@ -129,7 +129,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let Some(errors) = &result.errors else {
         return Err(no_match(&estimate, &reference));
     };
-    let told = Told::of(&estimate, (&estimated, referred), align);
+    let told = ErrorExplanation::of(&estimate, (&estimated, referred), align);
     if let Some(document) = plot {
         let chart = chart(&estimated, referred, align, errors);
         document.write(&chart.svg().map_err(|e| {
@@ -160,7 +160,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
 }
 
 /// Text about the errors beside their size.
-struct Told {
+struct ErrorExplanation {
     /// Whether they lie within what the estimate says of them; `None` where it says nothing.
     sigma: Option<Consistency>,
     /// The constant bias that explains them.
@@ -170,16 +170,16 @@ struct Told {
 /// Errors over a second that other axes explain to this share are no bias.
 const OTHER_AXES: f64 = 0.7;
 
-impl Told {
+impl ErrorExplanation {
     fn of(
         estimate: &attitude_track::Track,
         (estimated, referred): (&[Stamped], Reference<'_>),
         align: Align,
-    ) -> Told {
-        let known: Vec<Known> = estimated
+    ) -> ErrorExplanation {
+        let known: Vec<UncertainAttitude> = estimated
             .iter()
             .zip(&estimate.covariances)
-            .map(|((stamp, q_nb), covariance)| Known {
+            .map(|((stamp, q_nb), covariance)| UncertainAttitude {
                 stamp: *stamp,
                 q_nb: *q_nb,
                 covariance: *covariance,
@@ -193,7 +193,7 @@ impl Told {
                     !axes.inverse && axes.turned > OTHER_AXES * axes.as_recorded
                 })
         };
-        Told {
+        ErrorExplanation {
             sigma: consistency(&known, referred, align, |_| {}),
             bias: fit_constant_bias(estimated, referred).filter(is_bias),
         }
@@ -246,7 +246,7 @@ fn chart(estimate: &[Stamped], reference: Reference<'_>, align: Align, errors: &
             .map(|(index, (name, stats))| Series {
                 name: format!("{name}, rms {}", significant(stats.rms.to_degrees(), 3)),
                 points: traces.points(index, 1e9),
-                look: Look::Thin,
+                look: SeriesStyle::Thin,
                 color: Some(index + 1),
             })
             .collect(),
@@ -352,7 +352,7 @@ fn degrees(stats: &ErrorStats) -> [String; 3] {
 }
 
 fn as_json(
-    (result, told): (&Comparison, &Told),
+    (result, told): (&Comparison, &ErrorExplanation),
     align: Align,
     limit: Option<f64>,
     exceeded: bool,

@@ -59,8 +59,11 @@ pub struct Layered {
     matches: ArgMatches,
     from_file: Vec<String>,
     sources_from_file: bool,
-    sensors: Vec<(String, Estimation, Vec<OsString>)>,
+    sensors: Vec<SensorArgs>,
 }
+
+/// Id of a sensor, its settings, and the arguments they were told by.
+type SensorArgs = (String, Estimation, Vec<OsString>);
 
 /// Runs it.
 ///
@@ -119,27 +122,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
     let matches = subcommand(file, &matches)?;
     let sensors = sensors
         .into_iter()
-        .map(|(id, value)| {
-            let name = format!("[sensor.{id}]");
-            let Value::Table(own) = value else {
-                return Err(bad(file, format!("{name} is no table")));
-            };
-            let known = Sensor::command();
-            let mut argv = vec![OsString::from("sensor")];
-            extend(&mut argv, file, &name, &known, &own, Some(&first))?;
-            let added = argv.len();
-            // What holds for all holds for this one where it says nothing else.
-            for arg in known.get_arguments() {
-                let key = arg.get_long().unwrap_or_default();
-                if !own.contains_key(key) || is_given(&first, arg.get_id().as_str()) {
-                    inherit(&mut argv, &matches, arg);
-                }
-            }
-            let parsed =
-                Sensor::try_parse_from(&argv).map_err(|e| bad(file, format!("{name}: {e}")))?;
-            argv.truncate(added);
-            Ok((id, parsed.estimation, argv.split_off(1)))
-        })
+        .map(|(id, value)| sensor(file, id, value, (&first, &matches)))
         .collect::<Result<_>>()?;
     Ok(Layered {
         serve: args,
@@ -148,6 +131,34 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
         sources_from_file,
         sensors,
     })
+}
+
+/// Estimation settings of one sensor of the file, and the arguments they were told by. `first` is what the command line
+/// says, `whole` what it says with the file.
+fn sensor(
+    file: &Path,
+    id: String,
+    value: Value,
+    (first, whole): (&ArgMatches, &ArgMatches),
+) -> Result<SensorArgs> {
+    let name = format!("[sensor.{id}]");
+    let Value::Table(own) = value else {
+        return Err(bad(file, format!("{name} is no table")));
+    };
+    let known = Sensor::command();
+    let mut argv = vec![OsString::from("sensor")];
+    extend(&mut argv, file, &name, &known, &own, Some(first))?;
+    let added = argv.len();
+    // What holds for all holds for this one where it says nothing else.
+    for arg in known.get_arguments() {
+        let key = arg.get_long().unwrap_or_default();
+        if !own.contains_key(key) || is_given(first, arg.get_id().as_str()) {
+            inherit(&mut argv, whole, arg);
+        }
+    }
+    let parsed = Sensor::try_parse_from(&argv).map_err(|e| bad(file, format!("{name}: {e}")))?;
+    argv.truncate(added);
+    Ok((id, parsed.estimation, argv.split_off(1)))
 }
 
 fn bad(file: &Path, what: impl Into<Diagnostic>) -> Error {

@@ -9,7 +9,7 @@ use clap::Args;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Plan, SensorCalibration, settings};
+use strapd_attitude::estimate::{EstimationSettings, SensorCalibration, settings};
 use strapd_attitude::setting::{AID, CALIBRATION};
 use strapd_recording::Selection;
 
@@ -51,7 +51,7 @@ impl Estimation {
     /// # Errors
     /// [`Error::Usage`] naming the flag, for anything that can be judged without the data; the calibration cannot
     /// be read.
-    pub fn plan(&self) -> Result<Plan> {
+    pub fn plan(&self) -> Result<EstimationSettings> {
         let known = match self.settings.path(CALIBRATION) {
             None => None,
             Some(path) => Some(Calibrations::read(path)?.of_all().ok_or_else(|| {
@@ -64,7 +64,7 @@ impl Estimation {
         self.plan_with(known)
     }
 
-    fn plan_with(&self, calibration: Option<Arc<SensorCalibration>>) -> Result<Plan> {
+    fn plan_with(&self, calibration: Option<Arc<SensorCalibration>>) -> Result<EstimationSettings> {
         let mut plan = settings::defaults();
         self.settings
             .put(&mut plan, calibration)
@@ -82,8 +82,8 @@ impl Estimation {
     ///
     /// # Errors
     /// As [`Estimation::plan`]; [`Error::Usage`]: the flags do not go with a smoother.
-    pub fn plan_of_a_recording(&self, smooth: bool) -> Result<Plan> {
-        let plan = Plan {
+    pub fn plan_of_a_recording(&self, smooth: bool) -> Result<EstimationSettings> {
+        let plan = EstimationSettings {
             smooth,
             ..self.plan()?
         };
@@ -108,7 +108,7 @@ impl Estimation {
     ///
     /// # Errors
     /// As [`Estimation::plan`].
-    pub fn live_plans(&self) -> Result<(Plan, BTreeMap<String, Plan>)> {
+    pub fn live_plans(&self) -> Result<(EstimationSettings, BTreeMap<String, EstimationSettings>)> {
         self.check_live()?;
         let known = self.settings.path(CALIBRATION).map(Calibrations::read);
         Ok(match known.transpose()? {

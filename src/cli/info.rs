@@ -7,7 +7,7 @@ use super::tables::Tables;
 use super::{Global, Outcome, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::inspection::look;
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_recording::Recording;
@@ -67,7 +67,7 @@ fn one(
     file: &Path,
     (options, pool): (&Options, &Pool),
 ) -> Result<(String, Outcome)> {
-    let input = logged::open(file)?;
+    let input = opening::open(file)?;
     let log = Recording::told_apart(&input, args.topic.as_deref(), options, pool)?;
     if let Some(topic) = &args.topic
         && !log.has(topic)

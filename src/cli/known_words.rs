@@ -14,12 +14,12 @@ use strapd_bodies::top::method_errors::case;
 /// A parser of values, and the words among them that a shell offers. Its flag says `hide_possible_values`, as its help
 /// names them and what else there is.
 #[derive(Clone, Debug)]
-pub(super) struct Known<P> {
+pub(super) struct KnownWords<P> {
     words: Vec<&'static str>,
     parser: P,
 }
 
-impl<P: TypedValueParser> TypedValueParser for Known<P> {
+impl<P: TypedValueParser> TypedValueParser for KnownWords<P> {
     type Value = P::Value;
 
     fn parse_ref(
@@ -36,8 +36,8 @@ impl<P: TypedValueParser> TypedValueParser for Known<P> {
     }
 }
 
-fn text(words: impl IntoIterator<Item = &'static str>) -> Known<StringValueParser> {
-    Known {
+fn text(words: impl IntoIterator<Item = &'static str>) -> KnownWords<StringValueParser> {
+    KnownWords {
         words: words.into_iter().collect(),
         parser: StringValueParser::new(),
     }
@@ -49,12 +49,12 @@ pub(super) fn sample_kind() -> PossibleValuesParser {
 }
 
 /// `--speed`.
-pub(super) fn speed() -> Known<StringValueParser> {
+pub(super) fn speed() -> KnownWords<StringValueParser> {
     text(["max", "1"])
 }
 
 /// `--noise` of what simulates: sensors.
-pub(super) fn noise_of_a_sensor() -> Known<StringValueParser> {
+pub(super) fn noise_of_a_sensor() -> KnownWords<StringValueParser> {
     text(
         ["none"]
             .into_iter()
@@ -66,8 +66,8 @@ pub(super) fn noise_of_a_sensor() -> Known<StringValueParser> {
 type ByName<T> = fn(&str) -> Result<T, String>;
 
 /// `--case` of a top.
-pub(super) fn top_case() -> Known<ByName<Case>> {
-    Known {
+pub(super) fn top_case() -> KnownWords<ByName<Case>> {
+    KnownWords {
         words: Case::ALL.iter().map(|case| case.name()).collect(),
         parser: case,
     }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_recording::elsewhere;
+use strapd_recording::remote_object;
 
 /// Resolves every `-o` for one log of `logs`.
 ///
@@ -149,7 +149,7 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
 
 /// A recording as it is printed.
 pub(super) fn shown(log: &str) -> String {
-    match elsewhere::meant(log) {
+    match remote_object::meant(log) {
         Some(address) => address.place(),
         None => log.to_owned(),
     }

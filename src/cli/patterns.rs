@@ -4,7 +4,7 @@
 
 use crate::error::Result;
 use std::path::{Path, PathBuf};
-use strapd_recording::elsewhere;
+use strapd_recording::remote_object;
 
 /// The names with those that patterns mean, each pattern's in the order of their keys.
 pub(super) fn filled<N>(names: Vec<N>) -> Result<Vec<N>>
@@ -13,7 +13,7 @@ where
 {
     let mut all = Vec::new();
     for name in names {
-        let address = name.as_ref().to_str().and_then(elsewhere::meant);
+        let address = name.as_ref().to_str().and_then(remote_object::meant);
         let meant = address
             .as_ref()
             .and_then(|address| Some((address, crate::store::listed::meant(address)?)));

@@ -20,7 +20,7 @@ use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::setting::{BIAS, SMOOTH};
 use strapd_recording::Selection;
 use strapd_recording::Source;
@@ -329,7 +329,7 @@ impl Replay {
         &self,
         log: &str,
         outputs: &[String],
-        (selection, plan): (Selection, Plan),
+        (selection, plan): (Selection, EstimationSettings),
     ) -> Result<(ReplayRequest, Served)> {
         if self
             .out_rate

@@ -8,7 +8,7 @@ use super::{Global, Outcome, allan, own_output, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{Drawing, Examination, examine};
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use crate::pipeline::provenance::sha256;
 use crate::report::page::{DRAWN, FindingRow, Noise, Page, STRETCHES, Several, longest_rest};
 use crate::report::summary::{human_bytes, significant};
@@ -16,7 +16,7 @@ use crate::sink::Document;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::setting::SMOOTH;
 use strapd_recording::Input;
 use strapd_recording::Selection;
@@ -187,7 +187,7 @@ impl Report {
         (asked, pool): (&Examination<'_>, &Pool),
         take: &mut dyn FnMut(&Page<'_>) -> Result<Outcome>,
     ) -> Result<Outcome> {
-        let input = logged::open(file)?;
+        let input = opening::open(file)?;
         let mut reporter = Reporter::new(global, &input.name().display().to_string());
         let checked = examine(&input, asked, pool, &mut |position| {
             reporter.update(position);
@@ -234,7 +234,7 @@ impl Report {
             return Ok(None);
         };
         let track = attitude_track::read(
-            &logged::open(path)?,
+            &opening::open(path)?,
             Side::Reference,
             self.ref_topic.as_deref(),
             &Options::default(),
@@ -250,7 +250,7 @@ impl Report {
     fn noise(
         &self,
         input: &Input,
-        (selection, plan): (&Selection, &Plan),
+        (selection, plan): (&Selection, &EstimationSettings),
         topic: &CheckedTopic,
         pool: &Pool,
     ) -> Noise {
@@ -267,7 +267,7 @@ impl Report {
             ));
         }
         let begins = plan.start.unwrap_or(0.0) + begins;
-        let plan = Plan {
+        let plan = EstimationSettings {
             start: Some(begins),
             until: Some(begins + secs),
             ..plan.clone()

@@ -12,7 +12,7 @@ use crate::client::secret::Secret;
 use crate::client::sender::Sender;
 use crate::config::selection;
 use crate::error::{Error, Result};
-use crate::pipeline::logged;
+use crate::pipeline::opening;
 use crate::pipeline::pace::Pace;
 use clap::Args;
 use serde_json::json;
@@ -115,7 +115,7 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
     // Looked at before anybody is called: a log that cannot be read is not the daemon's business.
     let pool = Pool::new(global.threads)?;
     let log = Recording::told_apart(
-        &logged::open(&args.source)?,
+        &opening::open(&args.source)?,
         args.topic.as_deref(),
         &options,
         &pool,

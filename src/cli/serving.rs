@@ -7,7 +7,7 @@ use crate::pipeline::audience::Audience;
 use crate::serve::Settings;
 use crate::serve::core::hub;
 use crate::serve::playback::controls::Playback;
-use crate::serve::playback::server::{Cast, Next};
+use crate::serve::playback::server::{Next, PlaybackServer};
 use crate::sink::Target;
 use crate::sink::address::Listen;
 use clap::Args;
@@ -45,7 +45,7 @@ pub(super) struct Served {
     /// Speed.
     pub(super) speed: Option<f64>,
     /// Server, where there is somebody to serve.
-    cast: Option<Arc<Cast>>,
+    cast: Option<Arc<PlaybackServer>>,
     looping: bool,
     can_rewind: bool,
 }
@@ -123,7 +123,7 @@ impl Serving {
                 listen,
                 ..Settings::default()
             })?;
-            let cast = Cast::start(settings, playback, self.page.is_some(), true)?;
+            let cast = PlaybackServer::start(settings, playback, self.page.is_some(), true)?;
             let addresses: Vec<String> = cast.addresses().iter().map(ToString::to_string).collect();
             tracing::info!(
                 session = cast.hub().session(),

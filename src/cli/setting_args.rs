@@ -13,7 +13,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::settings::{Default, ROWS, Row, Takes, Value, named};
-use strapd_attitude::estimate::{Plan, SensorCalibration};
+use strapd_attitude::estimate::{EstimationSettings, SensorCalibration};
 use strapd_attitude::setting::{
     GYRO_UNIT, MAX_GAP, RATE_HZ, SAMPLE_KIND, SMOOTH, START, Setting, TIME, UNTIL,
 };
@@ -91,7 +91,7 @@ impl<S: Scope> Given<S> {
     /// [`Row::apply`].
     pub fn put(
         &self,
-        plan: &mut Plan,
+        plan: &mut EstimationSettings,
         calibration: Option<Arc<SensorCalibration>>,
     ) -> Result<(), Diagnostic> {
         for (row, value) in &self.values {

@@ -66,14 +66,14 @@ pub struct Series {
     /// `[x, y]`; a point that is not finite (or not positive on a logarithmic axis) interrupts the line.
     pub points: Vec<[f64; 2]>,
     /// Look.
-    pub look: Look,
+    pub look: SeriesStyle,
     /// Place in the palette; `None` = the next one. For series that belong together.
     pub color: Option<usize>,
 }
 
 /// Look of a [`Series`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Look {
+pub enum SeriesStyle {
     /// A line through the points.
     #[default]
     Line,
@@ -234,15 +234,15 @@ impl Chart {
             let y = 52 + ROW * row as i32;
             let color = PALETTE[series.color.unwrap_or(i) % PALETTE.len()];
             let pieces: &[(i32, i32)] = match series.look {
-                Look::Line | Look::Thin | Look::Marked => &[(0, 24)],
-                Look::Dashed => &[(0, 6), (9, 15), (18, 24)],
-                Look::Dots => &[],
+                SeriesStyle::Line | SeriesStyle::Thin | SeriesStyle::Marked => &[(0, 24)],
+                SeriesStyle::Dashed => &[(0, 6), (9, 15), (18, 24)],
+                SeriesStyle::Dots => &[],
             };
             for (from, to) in pieces {
                 let line = PathElement::new([(*from, y), (*to, y)], color.stroke_width(2));
                 area.draw(&line).map_err(say)?;
             }
-            if matches!(series.look, Look::Marked | Look::Dots) {
+            if matches!(series.look, SeriesStyle::Marked | SeriesStyle::Dots) {
                 area.draw(&Circle::new((12, y), 3, color.filled()))
                     .map_err(say)?;
             }
@@ -296,23 +296,31 @@ impl Chart {
             .map_err(say)?;
         for (i, series) in self.series.iter().enumerate() {
             let color = PALETTE[series.color.unwrap_or(i) % PALETTE.len()];
-            let style = color.stroke_width(if series.look == Look::Thin { 1 } else { 2 });
+            let style = color.stroke_width(if series.look == SeriesStyle::Thin {
+                1
+            } else {
+                2
+            });
             for run in series.points.split(|p| !self.drawable(p)) {
                 let points = || run.iter().map(|[x, y]| (*x, *y));
                 match series.look {
-                    Look::Line | Look::Thin | Look::Marked => {
+                    SeriesStyle::Line | SeriesStyle::Thin | SeriesStyle::Marked => {
                         chart
                             .draw_series(LineSeries::new(points(), style))
                             .map_err(say)?;
                     }
-                    Look::Dashed => {
+                    SeriesStyle::Dashed => {
                         let dashes = DashedLineSeries::new(points(), 6, 4, style);
                         chart.draw_series(dashes).map_err(say)?;
                     }
-                    Look::Dots => {}
+                    SeriesStyle::Dots => {}
                 }
-                if matches!(series.look, Look::Marked | Look::Dots) {
-                    let size = if series.look == Look::Dots { 2 } else { 3 };
+                if matches!(series.look, SeriesStyle::Marked | SeriesStyle::Dots) {
+                    let size = if series.look == SeriesStyle::Dots {
+                        2
+                    } else {
+                        3
+                    };
                     let dots = points().map(|p| Circle::new(p, size, color.filled()));
                     chart.draw_series(dots).map_err(say)?;
                 }
@@ -361,7 +369,7 @@ mod tests {
             series: vec![Series {
                 name: "auto".to_owned(),
                 points: vec![[500.0, 1e-9], [1000.0, 1e-11], [2000.0, 3e-13]],
-                look: Look::Marked,
+                look: SeriesStyle::Marked,
                 ..Series::default()
             }],
             ..Chart::default()
@@ -386,7 +394,7 @@ mod tests {
     #[test]
     fn points_that_can_not_be_drawn_interrupt_the_line() {
         let mut chart = chart();
-        chart.series[0].look = Look::Line;
+        chart.series[0].look = SeriesStyle::Line;
         chart.series[0].points.insert(2, [1500.0, f64::NAN]);
         chart.series[0].points.insert(2, [1200.0, 0.0]);
         chart.series[0].points.push([4000.0, 1e-13]);

@@ -19,7 +19,7 @@
 pub mod channel;
 pub mod context;
 pub mod hub;
-pub mod last;
+pub mod last_attitude;
 pub mod outbox;
 pub(super) mod outgoing;
 pub(super) mod owned;

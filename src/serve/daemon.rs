@@ -143,7 +143,7 @@ impl Server {
             tokio::spawn(listener.serve(context()));
         }
         #[cfg(feature = "nats")]
-        let tenancy = Arc::new(nats::tenure::Tenancy::default());
+        let tenancy = Arc::new(nats::tenure::LeaseWatch::default());
         for output in self.outputs {
             match output {
                 Output::Receiver(target) => tokio::spawn(forward::send(target, context())),

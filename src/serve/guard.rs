@@ -10,6 +10,7 @@
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 
 pub mod admission;
+pub(super) mod failed_logins;
 pub(super) mod fault;
 pub mod limits;
 pub(super) mod log_throttle;
@@ -18,4 +19,3 @@ pub mod peer;
 pub mod places;
 pub(super) mod redial;
 pub mod shutdown;
-pub(super) mod strangers;

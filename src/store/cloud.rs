@@ -458,10 +458,11 @@ fn is_listing(url: &reqwest::Url) -> bool {
 }
 
 /// A future as a trait with async functions has it.
-type Waiting<'a> = Pin<Box<dyn Future<Output = Result<HttpResponse, HttpError>> + Send + 'a>>;
+type ResponseFuture<'a> =
+    Pin<Box<dyn Future<Output = Result<HttpResponse, HttpError>> + Send + 'a>>;
 
 impl HttpService for Speaker {
-    fn call<'s, 'a>(&'s self, request: HttpRequest) -> Waiting<'a>
+    fn call<'s, 'a>(&'s self, request: HttpRequest) -> ResponseFuture<'a>
     where
         's: 'a,
         Self: 'a,

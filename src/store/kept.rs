@@ -16,7 +16,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_recording::elsewhere::Object;
+use strapd_recording::remote_object::Object;
 use tokio::runtime::Handle;
 
 /// Requests on their way at once.
@@ -28,7 +28,7 @@ const MOST: u64 = 8 << 30;
 
 /// An object that is being read.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(super) struct CachedObject {
     shared: Arc<Shared>,
     runtime: Handle,
 }
@@ -63,7 +63,7 @@ struct State {
     failed: Option<Diagnostic>,
 }
 
-impl Kept {
+impl CachedObject {
     /// An object of which the first part is on its way.
     ///
     /// # Errors
@@ -73,7 +73,7 @@ impl Kept {
         place: Arc<Place>,
         first: Part,
         patience: Patience,
-    ) -> io::Result<Kept> {
+    ) -> io::Result<CachedObject> {
         let shared = Arc::new(Shared {
             place,
             version: first.version,
@@ -110,7 +110,7 @@ impl Kept {
             // What was cut is fetched as anything else is.
             by.ended(by.download(at..range.end).await);
         });
-        Ok(Kept { shared, runtime })
+        Ok(CachedObject { shared, runtime })
     }
 
     fn start(&self, state: &mut State, range: Range<u64>) {
@@ -180,7 +180,7 @@ impl Kept {
     }
 }
 
-impl Object for Kept {
+impl Object for CachedObject {
     fn size(&self) -> u64 {
         self.shared.version.size
     }
@@ -217,7 +217,7 @@ impl Object for Kept {
     }
 }
 
-impl Drop for Kept {
+impl Drop for CachedObject {
     fn drop(&mut self) {
         self.shared.is_over.store(true, Ordering::Relaxed);
     }

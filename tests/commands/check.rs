@@ -9,9 +9,9 @@ mod recordings;
 
 use std::path::Path;
 use strapd::pipeline::check::{Examination, examine};
-use strapd::pipeline::logged;
+use strapd::pipeline::opening;
 use strapd::report::findings::{Finding, Severity, findings};
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::setting::Choice;
 use strapd_recording::Selection;
 use strapd_recording::pool::Pool;
@@ -21,12 +21,12 @@ fn found(path: &Path) -> Vec<Finding> {
     let pool = Pool::new(2).unwrap();
     let asked = Examination {
         selection: Selection::default(),
-        plan: Plan::default(),
+        plan: EstimationSettings::default(),
         reference_topic: String::new(),
         drawing: None,
         command: String::new(),
     };
-    let input = logged::open(path).unwrap();
+    let input = opening::open(path).unwrap();
     let mut found = findings(&examine(&input, &asked, &pool, &mut |_| {}).unwrap());
     found.retain(|finding| finding.code != "gyro-alone");
     found

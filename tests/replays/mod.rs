@@ -7,7 +7,7 @@ use strapd::pipeline::replay::run;
 use strapd::pipeline::request::ReplayRequest;
 use strapd::report::summary::{RunSummary, TopicSummary};
 use strapd::sink::Target;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 
@@ -21,7 +21,7 @@ pub fn replay_of(path: &Path) -> ReplayRequest {
 }
 
 /// The same with a plan.
-pub fn replay_with(path: &Path, plan: Plan) -> ReplayRequest {
+pub fn replay_with(path: &Path, plan: EstimationSettings) -> ReplayRequest {
     ReplayRequest {
         plan,
         ..replay_of(path)

@@ -7,7 +7,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Bias, Estimator, Meaning, Patience, Plan, Preparation};
+use strapd_attitude::estimate::{
+    Bias, EstimationSettings, Estimator, Meaning, Patience, Preparation,
+};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{Declared, Nanos, RawSample};
 
@@ -30,9 +32,9 @@ fn main() -> Result<(), Diagnostic> {
         .collect();
 
     // What is asked for, and what the format declares of its numbers (here: nothing).
-    let plan = Plan {
+    let plan = EstimationSettings {
         bias: Bias::Auto,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let meaning = Meaning::new(&plan, &Declared::default());
     let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);

@@ -18,7 +18,7 @@ use strapd_attitude::frames::In;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::Nanos;
 use strapd_attitude::smooth::{
-    Estimate, Looseness, MotionModel, Outcome, Sample, SampleModel, Settings, smooth,
+    Estimate, MotionModel, Outcome, PriorScale, Sample, SampleModel, Settings, smooth,
 };
 
 type Failure = Box<dyn std::error::Error>;
@@ -144,7 +144,7 @@ fn main() -> Result<(), Failure> {
             Some(("unresolved", value)) => settings.has_unresolved = value == "1",
             Some(("loose", value)) => {
                 let by = value.parse()?;
-                settings.looseness = Looseness {
+                settings.looseness = PriorScale {
                     scale: by,
                     axes: by,
                     force: by,

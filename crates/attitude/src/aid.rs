@@ -55,8 +55,8 @@ mod tests;
 mod update;
 mod vertical;
 
-pub use aided::{Aided, Start};
-pub(crate) use beside::Beside;
+pub use aided::{AidedPropagator, Start};
+pub(crate) use beside::VectorPairing;
 pub use calibration::Calibration;
 pub use filter::{Filter, Innovation, Report};
 pub use heading::FieldQuality;

@@ -22,7 +22,7 @@ mod statistics;
 
 pub use align::{Align, ParseAlignError};
 pub use body_axes::{BodyAxesFit, fit_body_axes};
-pub use consistency::{BoundedError, Consistency, Known, WithinSigma, consistency};
+pub use consistency::{BoundedError, Consistency, UncertainAttitude, WithinSigma, consistency};
 pub use constant_bias::{BiasFit, fit_constant_bias};
 pub use reference::Reference;
 pub use relative::RelativeError;

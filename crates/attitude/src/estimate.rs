@@ -28,12 +28,12 @@ mod pooled;
 mod preparation;
 mod sensor_calibration;
 pub mod settings;
-mod settings_number;
+mod settings_fingerprint;
 mod smoothing;
 mod stamps;
 
 pub use aiding::{Aiding, Forces};
-pub use anew::Anew;
+pub use anew::RestartRequest;
 pub use calibrated::learned;
 pub use clock_pass::{ClockPass, ClockVerdict};
 pub use estimator::{Estimator, Memory};
@@ -43,10 +43,11 @@ pub use kept::{Spool, SpoolError};
 pub use meaning::{Meaning, orientation_convention};
 pub use noise_figures::{NOISE_FIGURES, NoiseFigure};
 pub use plan::{
-    Aid, Bias, CLASS_BY_DATA, Initial, NOISE_PRESETS, Noise, NoisePreset, Plan, Truncation,
+    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, NOISE_PRESETS, Noise, NoisePreset,
+    Truncation,
 };
 pub use pooled::Pooled;
 pub use preparation::{Patience, Preparation, Prepared, at_once};
-pub use sensor_calibration::{Known, SensorCalibration};
+pub use sensor_calibration::{CalibrationTerm, SensorCalibration};
 pub use smoothing::Recording;
 pub use stamps::{StampPass, Stamps};

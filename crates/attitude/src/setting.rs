@@ -2,7 +2,7 @@
 //!
 //! A stage of its own because a refusal or a warning of a library says which setting helps, and a library does not
 //! know how
-//! that is set: by a flag of a command, an argument in Python, a field of [`Plan`](crate::estimate::Plan). So its
+//! that is set: by a flag of a command, an argument in Python, a field of [`EstimationSettings`](crate::estimate::Plan). So its
 //! texts hold a
 //! [`Setting`], which a program that talks to people names in its own way, once, by [`name_settings`] (as
 //! `std::panic::set_hook` does for panics). Until then it is called as a field is: `gyro_unit`.
@@ -89,9 +89,9 @@ impl fmt::Display for Choice {
 }
 
 /// Writes how a setting of this name is called.
-pub type Naming = fn(&str, &mut fmt::Formatter<'_>) -> fmt::Result;
+pub type SettingNamer = fn(&str, &mut fmt::Formatter<'_>) -> fmt::Result;
 
-static NAMING: OnceLock<Naming> = OnceLock::new();
+static NAMING: OnceLock<SettingNamer> = OnceLock::new();
 
 /// [`name_settings`] was called before: a program talks in one way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -109,7 +109,7 @@ impl std::error::Error for AlreadyNamed {}
 ///
 /// # Errors
 /// [`AlreadyNamed`]; what was said first holds.
-pub fn name_settings(naming: Naming) -> Result<(), AlreadyNamed> {
+pub fn name_settings(naming: SettingNamer) -> Result<(), AlreadyNamed> {
     NAMING.set(naming).map_err(|_| AlreadyNamed)
 }
 

@@ -86,13 +86,13 @@ pub(crate) use border::FORCE_SCALE;
 pub use error::SmoothError;
 pub use output::Estimate;
 pub use phase::Failure;
-pub use planar::Held;
+pub use planar::HeldBias;
 pub(crate) use result::OBSERVED;
-pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section, Sizes};
+pub use result::{Bias, Calibration, Counts, Estimated, Magnetometer, Outcome, Section, Sizes};
 pub use sample::{Sample, Samples};
 pub(crate) use settings::BIAS_SIGMA;
 pub use settings::{
-    Beforehand, FieldUnit, HeadingReference, Looseness, MotionModel, SampleModel, Settings,
+    FieldUnit, HeadingReference, MotionModel, PriorScale, PriorSigmas, SampleModel, Settings,
 };
 pub use smoothed::Smoothed;
 pub use survey::Quantisation;

@@ -170,7 +170,7 @@ pub struct Stretch {
 
 /// Observations made on the way.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Noticed {
+pub struct GenerationCounts {
     /// Instants so far.
     pub instants: u64,
     /// Samples put out.
@@ -224,7 +224,7 @@ pub struct Synthetic {
     /// Nanoseconds since the start of the one before.
     before: u64,
     last_q_nb: Quaternion<Nav, Body>,
-    noticed: Noticed,
+    noticed: GenerationCounts,
 }
 
 impl Synthetic {
@@ -319,7 +319,7 @@ impl Synthetic {
             next: 0,
             before: 0,
             last_q_nb: spin.q_nb,
-            noticed: Noticed::default(),
+            noticed: GenerationCounts::default(),
             sampling,
         })
     }
@@ -344,7 +344,7 @@ impl Synthetic {
 
     /// Observations so far.
     #[must_use]
-    pub fn noticed(&self) -> Noticed {
+    pub fn noticed(&self) -> GenerationCounts {
         self.noticed
     }
 

@@ -59,7 +59,7 @@ use ros::fifo::Fifo;
 use schema::rosmsg::Dialect;
 use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
 use select::names::{self, Px4};
-use select::{Found, Selection, select};
+use select::{MatchQuality, Selection, select};
 use std::sync::Arc;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind, TimeUnit};
 
@@ -157,13 +157,13 @@ pub struct Decoded {
 /// Reads the messages of one channel. A copy shares what was compiled.
 #[derive(Debug, Clone)]
 pub struct Decoder {
-    plan: Plan,
+    plan: Program,
     /// Form by which registers become samples; of JSON the plan knows.
     form: Form,
     /// Finds the frame in messages that have a schema.
-    frame: Option<Plan>,
+    frame: Option<Program>,
     stated: Stated,
-    found: Found,
+    found: MatchQuality,
     /// Stamps are numbers whose unit nothing states; of JSON before its first message: they may be.
     has_bare_stamps: bool,
     /// Paths of stamps; the one that is read is [`Options::nth_stamp`].
@@ -174,11 +174,11 @@ pub struct Decoder {
 }
 
 #[derive(Debug, Clone)]
-enum Plan {
-    Ros(Arc<ros::Plan>),
+enum Program {
+    Ros(Arc<ros::Program>),
     Fifo(Arc<Fifo>),
-    Protobuf(Arc<protobuf::Plan>),
-    Json(json::Plan),
+    Protobuf(Arc<protobuf::Program>),
+    Json(json::Program),
     /// Messages come as samples.
     Samples,
 }
@@ -265,18 +265,18 @@ impl Decoder {
             .and_then(|path| match channel.message_encoding {
                 "protobuf" => protobuf::plan::text(&schema, path)
                     .ok()
-                    .map(|plan| Plan::Protobuf(Arc::new(plan))),
+                    .map(|plan| Program::Protobuf(Arc::new(plan))),
                 "ros1" => ros::compile::text(&schema, path, ros::compile::Layout::Ros1)
                     .ok()
-                    .map(|plan| Plan::Ros(Arc::new(plan))),
+                    .map(|plan| Program::Ros(Arc::new(plan))),
                 _ => ros::compile::text(&schema, path, ros::compile::Layout::Cdr)
                     .ok()
-                    .map(|plan| Plan::Ros(Arc::new(plan))),
+                    .map(|plan| Program::Ros(Arc::new(plan))),
             });
         let form = match &plan {
-            Plan::Ros(plan) => plan.form(),
-            Plan::Protobuf(plan) => plan.form(),
-            Plan::Fifo(_) | Plan::Json(_) | Plan::Samples => Form::default(),
+            Program::Ros(plan) => plan.form(),
+            Program::Protobuf(plan) => plan.form(),
+            Program::Fifo(_) | Program::Json(_) | Program::Samples => Form::default(),
         };
         Ok(Decoder {
             has_bare_stamps: matches!(
@@ -300,11 +300,11 @@ impl Decoder {
         stated.batched = true;
         stated.description = "gyro x, y, z, stamp timestamp_sample".to_owned();
         Decoder {
-            plan: Plan::Fifo(Arc::new(fifo)),
+            plan: Program::Fifo(Arc::new(fifo)),
             form: Form::default(),
             frame: None,
             stated,
-            found: Found::Named,
+            found: MatchQuality::Named,
             has_bare_stamps: false,
             stamps: Vec::new(),
             options: Options::default(),
@@ -323,12 +323,12 @@ impl Decoder {
         stated.has_gyro |= keys.0;
         stated.has_stamp |= keys.1;
         let found = if stated.has_gyro {
-            Found::Named
+            MatchQuality::Named
         } else {
-            Found::Nothing
+            MatchQuality::Nothing
         };
         Decoder {
-            plan: Plan::Json(json::Plan::compile(channel.schema_name, options)),
+            plan: Program::Json(json::Program::compile(channel.schema_name, options)),
             form: Form::default(),
             frame: None,
             stated,
@@ -344,11 +344,11 @@ impl Decoder {
     #[must_use]
     pub fn of_samples(channel: &Channel<'_>, stated: Stated) -> Decoder {
         Decoder {
-            plan: Plan::Samples,
+            plan: Program::Samples,
             form: Form::default(),
             frame: None,
             stated,
-            found: Found::Named,
+            found: MatchQuality::Named,
             has_bare_stamps: false,
             stamps: Vec::new(),
             options: Options::default(),
@@ -379,11 +379,11 @@ impl Decoder {
         out: &mut Vec<RawSample>,
     ) -> Result<Decoded, Undecodable> {
         match &self.plan {
-            Plan::Ros(plan) => plan.decode(form, payload, log, publish, out),
-            Plan::Fifo(fifo) => fifo.decode(payload, log, publish, out),
-            Plan::Protobuf(plan) => plan.decode(form, payload, log, publish, out),
-            Plan::Json(plan) => plan.decode(payload, log, publish, out),
-            Plan::Samples => Ok(Decoded::default()),
+            Program::Ros(plan) => plan.decode(form, payload, log, publish, out),
+            Program::Fifo(fifo) => fifo.decode(payload, log, publish, out),
+            Program::Protobuf(plan) => plan.decode(form, payload, log, publish, out),
+            Program::Json(plan) => plan.decode(payload, log, publish, out),
+            Program::Samples => Ok(Decoded::default()),
         }
     }
 
@@ -399,7 +399,7 @@ impl Decoder {
         publish: Nanos,
         out: &mut Vec<RawSample>,
     ) -> Result<Option<Decoded>, Undecodable> {
-        if let Plan::Json(plan) = &self.plan {
+        if let Program::Json(plan) = &self.plan {
             return plan.decode_of(frame, payload, log, publish, out);
         }
         let names_another = |named: &[u8]| {
@@ -463,7 +463,7 @@ impl Decoder {
     /// The frame a message names: at most 255 bytes, control characters escaped.
     #[must_use]
     pub fn frame_id(&self, payload: &[u8]) -> Option<String> {
-        if let Plan::Json(plan) = &self.plan {
+        if let Program::Json(plan) = &self.plan {
             return plan.find(payload).ok()?.frame.as_deref().map(printable);
         }
         let bytes = self.frame_bytes(payload)?;
@@ -473,18 +473,18 @@ impl Decoder {
     /// Whether messages may name a frame.
     #[must_use]
     pub(crate) fn names_frames(&self) -> bool {
-        self.frame.is_some() || matches!(self.plan, Plan::Json(_))
+        self.frame.is_some() || matches!(self.plan, Program::Json(_))
     }
 
     fn frame_bytes<'a>(&'a self, payload: &'a [u8]) -> Option<&'a [u8]> {
         match self.frame.as_ref()? {
-            Plan::Ros(plan) => plan.text(payload),
-            Plan::Protobuf(plan) => plan.text(payload),
-            Plan::Fifo(_) | Plan::Json(_) | Plan::Samples => None,
+            Program::Ros(plan) => plan.text(payload),
+            Program::Protobuf(plan) => plan.text(payload),
+            Program::Fifo(_) | Program::Json(_) | Program::Samples => None,
         }
     }
 
-    fn found(&self) -> Found {
+    fn found(&self) -> MatchQuality {
         self.found
     }
 }
@@ -624,18 +624,18 @@ fn compile_plan(
     schema: &Schema,
     selection: &Selection,
     options: &Options,
-) -> Result<Plan, String> {
+) -> Result<Program, String> {
     let child = options.child_frame.as_deref();
     let layout = match channel.message_encoding {
         "protobuf" => {
             return protobuf::plan::samples(schema, selection, child)
-                .map(|plan| Plan::Protobuf(Arc::new(plan)));
+                .map(|plan| Program::Protobuf(Arc::new(plan)));
         }
         "ros1" => ros::compile::Layout::Ros1,
         _ => ros::compile::Layout::Cdr,
     };
     let plan = ros::compile::samples(schema, selection, child, layout)?;
-    Ok(Plan::Ros(Arc::new(plan.recognised())))
+    Ok(Program::Ros(Arc::new(plan.recognised())))
 }
 
 fn state(type_name: &str, selection: &Selection, options: &Options) -> Stated {
@@ -662,7 +662,7 @@ fn state(type_name: &str, selection: &Selection, options: &Options) -> Stated {
     stated.batched = selection
         .batch
         .as_ref()
-        .is_some_and(|batch| batch.element == select::Step::Each);
+        .is_some_and(|batch| batch.element == select::PathStep::Each);
     stated.description = printable(&selection.description.join(", "));
     stated
 }

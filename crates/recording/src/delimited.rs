@@ -26,5 +26,5 @@ pub(crate) use own::is_own_column;
 pub(crate) use rows::LOST;
 
 pub(crate) use layout::{
-    Held, MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table,
+    MOST_HEAD_LINES, Opening, SampledLine, is_header, is_text_of_cells, may_be_table,
 };

@@ -7,10 +7,10 @@ mod packed;
 
 use crate::decode::packed::{HEAD, MARK, length};
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
-use crate::delimited::{Held, Opening, Table};
+use crate::delimited::{Opening, SampledLine, Table};
 use crate::error::{Error, Result};
 use crate::format::Format;
-use beside::Beside;
+use beside::SidecarFile;
 use packed::Numbers;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
@@ -30,9 +30,9 @@ pub struct Lines<R> {
     offset: u64,
     line: Vec<u8>,
     /// Rows of a table that were looked at before, with their numbers.
-    held: VecDeque<Held>,
+    held: VecDeque<SampledLine>,
     /// Files of the same recording with forces or fields, and what is next in this one.
-    beside: Vec<Beside<R>>,
+    beside: Vec<SidecarFile<R>>,
     next: Option<Next>,
     /// Beginning of the input, as far as it had come.
     head: Vec<u8>,
@@ -179,7 +179,7 @@ impl<R: Read> Lines<R> {
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let own = self.table().map(Table::notes).unwrap_or_default();
-        let others = self.beside.iter().flat_map(Beside::notes);
+        let others = self.beside.iter().flat_map(SidecarFile::notes);
         own.iter().cloned().chain(others).collect()
     }
 
@@ -191,7 +191,7 @@ impl<R: Read> Lines<R> {
             .map(Table::declared)
             .cloned()
             .unwrap_or_default();
-        let mut of_others = self.beside.iter().map(Beside::declared);
+        let mut of_others = self.beside.iter().map(SidecarFile::declared);
         declared.accel_unit = declared
             .accel_unit
             .or_else(|| of_others.find_map(|d| d.accel_unit));

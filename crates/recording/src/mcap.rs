@@ -53,10 +53,10 @@ pub(crate) use survey::OURS;
 pub use survey::{ChannelSurvey, PassedChunks, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
-use crate::elsewhere::{self, Object};
 use crate::error::{Error, Result};
 use crate::format::{Format, LONGEST_MAGIC, Reading, is_video};
 use crate::recognise::{self, Foreign};
+use crate::remote_object::{self, Object};
 use index::Index;
 use input::{Input, LogFile};
 use std::fs::File;
@@ -90,14 +90,14 @@ pub struct Reader {
     limits: Limits,
     format: Format,
     /// The files beside a database.
-    beside: Beside,
+    beside: DatabaseSidecars,
     /// Index of the chunks of a remote object that need not be read.
     index: Option<Arc<Index>>,
 }
 
 /// Files that a recorder that was killed leaves beside a database.
 #[derive(Clone, Debug, Default)]
-struct Beside {
+struct DatabaseSidecars {
     /// The file `-wal`.
     wal: Option<Arc<LogFile>>,
     /// Whether there is a file `-journal` with pages as they were before a change that was not ended.
@@ -127,7 +127,7 @@ impl Reader {
         let reader = Reader::of_file(path, file)?;
         Ok(match reader.format.reading() {
             Reading::Database => Reader {
-                beside: Beside::of(path),
+                beside: DatabaseSidecars::of(path),
                 ..reader
             },
             _ => reader,
@@ -149,7 +149,7 @@ impl Reader {
             format: format_of(&file)?,
             input: Input::File(Arc::new(file)),
             limits: Limits::default(),
-            beside: Beside::default(),
+            beside: DatabaseSidecars::default(),
             index: None,
         })
     }
@@ -171,13 +171,13 @@ impl Reader {
         };
         // With an index each walk says what it reads.
         if index.is_none() {
-            object.expect(elsewhere::whole(object.as_ref()), AHEAD);
+            object.expect(remote_object::whole(object.as_ref()), AHEAD);
         }
         Ok(Reader {
             format,
             input: Input::File(file),
             limits,
-            beside: Beside::default(),
+            beside: DatabaseSidecars::default(),
             index: index.map(Arc::new),
         })
     }
@@ -218,7 +218,7 @@ impl Reader {
             input: Input::Stream { name, from },
             limits: Limits::default(),
             format,
-            beside: Beside::default(),
+            beside: DatabaseSidecars::default(),
             index: None,
         })
     }
@@ -266,15 +266,15 @@ impl Reader {
     }
 }
 
-impl Beside {
-    fn of(path: &Path) -> Beside {
-        let journal = Beside::file(path, "-journal");
+impl DatabaseSidecars {
+    fn of(path: &Path) -> DatabaseSidecars {
+        let journal = DatabaseSidecars::file(path, "-journal");
         let has_journal = journal.is_some_and(|file| {
             let mut head = [0; JOURNAL_MAGIC.len()];
             file.read_at(&mut head, 0).is_ok() && head == JOURNAL_MAGIC
         });
-        Beside {
-            wal: Beside::file(path, "-wal"),
+        DatabaseSidecars {
+            wal: DatabaseSidecars::file(path, "-wal"),
             has_journal,
         }
     }

@@ -40,12 +40,12 @@ fn is_plain(word: &str) -> bool {
 }
 
 /// Row of a known format: where its mark is, the mark, its name, and the way in.
-type Known = (usize, &'static [u8], &'static str, &'static str);
+type FormatMark = (usize, &'static [u8], &'static str, &'static str);
 
 const LINES: &str =
     "write a line {\"stamp_s\": T, \"gyro\": [X, Y, Z]} for each sample into a file .ndjson";
 
-const KNOWN: &[Known] = &[
+const KNOWN: &[FormatMark] = &[
     (
         0,
         b"rosbag2_",
@@ -193,7 +193,8 @@ pub fn marked(first: &[u8], last: &[u8]) -> Option<Foreign> {
     if first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06") {
         return of("a ZIP archive", &zip::way_in(last));
     }
-    let has = |(at, mark, ..): &&Known| first.get(*at..).is_some_and(|rest| rest.starts_with(mark));
+    let has =
+        |(at, mark, ..): &&FormatMark| first.get(*at..).is_some_and(|rest| rest.starts_with(mark));
     if let Some((_, _, name, way_in)) = KNOWN.iter().find(has) {
         let as_lines = AS_LINES.iter().any(|part| name.contains(part));
         return match as_lines {

@@ -28,7 +28,7 @@ pub(crate) use header::{Encoding, HEADER, Header};
 pub(crate) use page::{Kind, Page};
 pub(crate) use row::{Row, Value};
 pub(crate) use seen::Seen;
-pub(crate) use table::{Found, Table};
+pub(crate) use table::{Table, TableItem};
 pub(crate) use tree::TWICE;
 
 /// The first bytes of a database.

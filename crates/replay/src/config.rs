@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use std::fmt::Display;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::settings::with;
-use strapd_attitude::estimate::{Aid, Initial, Noise, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings, Initial, Noise};
 use strapd_attitude::setting::{ACCEL_TOPIC, AID, FIELD, INIT, MAG_TOPIC, NOISE, SHARD};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
 use strapd_recording::{Selection, TopicBeside};
@@ -31,7 +31,10 @@ pub fn parse_initial(text: &str) -> Result<Initial> {
 ///
 /// # Errors
 /// [`Error::Usage`] naming the topic and the aid that uses it.
-pub fn take_beside(plan: &mut Plan, [accel, mag]: [Option<&String>; 2]) -> Result<()> {
+pub fn take_beside(
+    plan: &mut EstimationSettings,
+    [accel, mag]: [Option<&String>; 2],
+) -> Result<()> {
     plan.has_forces_beside = accel.is_some();
     for (topic, is_unused, aid) in [
         (

@@ -8,7 +8,7 @@ use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::condition::stillness::{self, Rests};
 use strapd_attitude::condition::{Clock, ClockSet, GyroUnit};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Aiding, ClockVerdict, Meaning, Plan};
+use strapd_attitude::estimate::{Aid, Aiding, ClockVerdict, EstimationSettings, Meaning};
 use strapd_attitude::record::{Counts, RawSample};
 use strapd_recording::MadeBefore;
 use strapd_recording::recording::beside::TopicOfVectors;
@@ -81,12 +81,12 @@ pub struct Aids {
 impl Aids {
     /// Makes it from the first samples of a topic.
     pub(crate) fn of(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         first: &[RawSample],
         beside: &[RawSample],
     ) -> Aids {
-        let plan = Plan {
+        let plan = EstimationSettings {
             aid: Aid::Auto,
             ..plan.clone()
         };

@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
 use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock_as};
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::estimate::Meaning;
-use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::AngleRecord;
 use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
@@ -35,7 +35,7 @@ const USEFUL: f64 = 10.0;
 const UNEVEN: f64 = 0.05;
 
 /// A record and what is known about it.
-pub(super) struct Gathered {
+pub(super) struct AngleSeries {
     pub(super) topic: String,
     pub(super) described: String,
     pub(super) resolved: Meaning,
@@ -69,10 +69,10 @@ pub(super) struct Gathered {
 /// The log cannot be read, no topic or several, or a topic without a rate.
 pub(super) fn gather(
     input: &Input,
-    (selection, plan): (&Selection, &Plan),
+    (selection, plan): (&Selection, &EstimationSettings),
     capacity: usize,
     pool: &Pool,
-) -> Result<Gathered> {
+) -> Result<AngleSeries> {
     if selection.topic.as_deref() == Some("all") {
         return Err(Error::usage(
             Diagnostic::new("--topic all: one topic at a time").help("--topic NAME"),
@@ -119,7 +119,7 @@ pub(super) fn gather(
 
 /// A record being gathered.
 struct Gathering {
-    plan: Plan,
+    plan: EstimationSettings,
     resolved: Meaning,
     first: Vec<RawSample>,
     running: Option<Conditioner>,
@@ -143,7 +143,7 @@ struct Gathering {
 }
 
 impl Gathering {
-    fn new(plan: &Plan, resolved: Meaning, capacity: usize) -> Gathering {
+    fn new(plan: &EstimationSettings, resolved: Meaning, capacity: usize) -> Gathering {
         Gathering {
             plan: plan.clone(),
             detector: Stillness::new(Limits::default()),
@@ -282,7 +282,7 @@ impl Gathering {
         described: String,
         mut notes: Vec<String>,
         lost_in_file: bool,
-    ) -> std::result::Result<Gathered, Diagnostic> {
+    ) -> std::result::Result<AngleSeries, Diagnostic> {
         if self.running.is_none() {
             self.begin()?;
         }
@@ -297,7 +297,7 @@ impl Gathering {
         let steps = self.steps.max(1) as f64;
         let mean = self.step_sum as f64 / steps;
         let off = mean - self.step_first as f64;
-        Ok(Gathered {
+        Ok(AngleSeries {
             topic,
             described,
             resolved: self.resolved,
@@ -322,7 +322,7 @@ impl Gathering {
     }
 }
 
-impl Gathered {
+impl AngleSeries {
     /// Whether samples were lost.
     pub(super) fn is_lossy(&self) -> bool {
         self.lost_in_file || self.undecodable > 0 || self.report.counts.lost() > 0

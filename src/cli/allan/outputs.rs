@@ -1,7 +1,7 @@
 //! Curves and fits -> a chart, a table. Pure.
 
 use super::Axis;
-use crate::report::plot::{self, Chart, Look, Series};
+use crate::report::plot::{self, Chart, Series, SeriesStyle};
 use std::fmt::Write as _;
 
 const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
@@ -19,14 +19,14 @@ pub(super) fn chart(topic: &str, axes: &[Axis]) -> Chart {
         series.push(Series {
             name: format!("{}, measured", axis.name),
             points: points(&|p| p.sigma),
-            look: Look::Dots,
+            look: SeriesStyle::Dots,
             color: Some(i + 1),
         });
         if let Some(fit) = &axis.fit {
             series.push(Series {
                 name: format!("{}, fitted", axis.name),
                 points: points(&|p| fit.deviation(p.tau)),
-                look: Look::Dashed,
+                look: SeriesStyle::Dashed,
                 color: Some(i + 1),
             });
         }

@@ -1,7 +1,7 @@
 //! Curves and fits -> text for people, JSON, and flags to paste. Pure.
 
 use super::Axis;
-use super::gather::Gathered;
+use super::gather::AngleSeries;
 use crate::report::summary::{meaning, significant};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -46,7 +46,7 @@ pub(super) fn doubts(axes: &[Axis]) -> Vec<String> {
 
 /// Axes' terms together: root mean square over the axes where the term was seen; absent where most
 /// axes do not show it. Nothing from a sensor that moved.
-fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
+fn together(gathered: &AngleSeries, axes: &[Axis]) -> ImuError {
     if gathered.moved() {
         return ImuError::default();
     }
@@ -70,7 +70,7 @@ fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
 
 /// Text that `replay --noise` takes, axis by axis, in the units of data sheets. `None` without an
 /// angle random walk on every axis, or from a sensor that moved.
-fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
+fn for_replay(gathered: &AngleSeries, axes: &[Axis]) -> Option<String> {
     let errors: Option<Vec<ImuError>> = axes
         .iter()
         .map(|a| a.fit.as_ref().map(AllanFit::error))
@@ -96,7 +96,7 @@ fn lowest(points: &[Point]) -> Option<&Point> {
     points.iter().min_by(|a, b| a.sigma.total_cmp(&b.sigma))
 }
 
-pub(super) fn text(path: &Path, gathered: &Gathered, axes: &[Axis]) -> String {
+pub(super) fn text(path: &Path, gathered: &AngleSeries, axes: &[Axis]) -> String {
     let mut out = format!(
         "{} {} ({})\n",
         path.display(),
@@ -180,7 +180,7 @@ fn cell(fitted: &FittedTerm, si: f64) -> String {
     }
 }
 
-pub(super) fn json(gathered: &Gathered, axes: &[Axis]) -> Value {
+pub(super) fn json(gathered: &AngleSeries, axes: &[Axis]) -> Value {
     let error = together(gathered, axes);
     let noise: serde_json::Map<String, Value> = FITTED
         .iter()

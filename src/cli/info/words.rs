@@ -50,20 +50,29 @@ fn write_file(info: &Overview<'_>, out: &mut String) {
         }
     }
     let _ = writeln!(out);
-    let format = info.input.format();
-    if format.is_text() {
-        let _ = writeln!(
-            out,
-            "          {} samples of {} sensors; {}",
-            survey.messages,
-            survey.channels.len(),
-            format.name()
-        );
-        for said in info.tables() {
-            let _ = writeln!(out, "          read as {said}");
-        }
-        return;
+    match info.input.format() {
+        text if text.is_text() => write_sensors(info, text, out),
+        format => write_messages(info, format, out),
     }
+}
+
+/// Writes how many samples of how many sensors a text holds, and as what its tables are read.
+fn write_sensors(info: &Overview<'_>, format: Format, out: &mut String) {
+    let _ = writeln!(
+        out,
+        "          {} samples of {} sensors; {}",
+        info.survey.messages,
+        info.survey.channels.len(),
+        format.name()
+    );
+    for said in info.tables() {
+        let _ = writeln!(out, "          read as {said}");
+    }
+}
+
+/// Writes how many messages of how many topics a log holds, and how they are packed.
+fn write_messages(info: &Overview<'_>, format: Format, out: &mut String) {
+    let survey = info.survey;
     let chunks: Vec<String> = survey
         .facts
         .chunks

@@ -85,13 +85,13 @@ pub(super) struct Tilt {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 struct Aid {
-    learned: Learned,
-    sigma: Learned,
+    learned: LearnedBias,
+    sigma: LearnedBias,
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(default)]
-struct Learned {
+struct LearnedBias {
     gyro_bias_rad_s: [Option<f64>; 3],
 }
 
@@ -99,7 +99,7 @@ impl Health {
     /// The gyro's bias and its sigma, rad/s, where the daemon learns it.
     pub(super) fn bias(&self) -> Option<([f64; 3], [f64; 3])> {
         let aid = self.aid.as_ref()?;
-        let whole = |learned: Learned| learned.gyro_bias_rad_s.map(|v| v.unwrap_or(f64::NAN));
+        let whole = |learned: LearnedBias| learned.gyro_bias_rad_s.map(|v| v.unwrap_or(f64::NAN));
         Some((whole(aid.learned), whole(aid.sigma)))
     }
 }

@@ -1,7 +1,7 @@
 //! Series kept of a run -> charts over time. Pure.
 
 use super::looking;
-use crate::report::plot::{Axis, Chart, Look, Series};
+use crate::report::plot::{Axis, Chart, Series, SeriesStyle};
 use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::trace::Traces;
 use strapd_attitude::condition::quality::QualitySummary;
@@ -76,8 +76,8 @@ fn line(name: &str, color: usize, points: Vec<[f64; 2]>) -> Series {
     Series {
         name: name.to_owned(),
         look: match points.len() {
-            0..=FEW => Look::Marked,
-            _ => Look::Thin,
+            0..=FEW => SeriesStyle::Marked,
+            _ => SeriesStyle::Thin,
         },
         points,
         color: Some(color),
@@ -86,7 +86,7 @@ fn line(name: &str, color: usize, points: Vec<[f64; 2]>) -> Series {
 
 fn bound(name: &str, points: Vec<[f64; 2]>, color: usize) -> Series {
     Series {
-        look: Look::Dashed,
+        look: SeriesStyle::Dashed,
         ..line(name, color, points)
     }
 }

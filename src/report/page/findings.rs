@@ -4,7 +4,7 @@ use super::markup::{escaped, sentence};
 use crate::report::findings::{Finding, Severity, findings};
 use serde_json::Value;
 use std::fmt::Write as _;
-use strapd_attitude::estimate::{Bias, Plan};
+use strapd_attitude::estimate::{Bias, EstimationSettings};
 use strapd_replay::inspection::Checked;
 
 /// Most findings written out; the worst come first.
@@ -22,7 +22,7 @@ pub struct FindingRow {
 impl FindingRow {
     /// Everything that is found about a log examined by `plan`.
     #[must_use]
-    pub fn all(checked: &Checked, plan: &Plan) -> Vec<FindingRow> {
+    pub fn all(checked: &Checked, plan: &EstimationSettings) -> Vec<FindingRow> {
         let row = |finding: Finding| FindingRow {
             answered: answered(finding.code, plan),
             finding,
@@ -48,7 +48,7 @@ impl FindingRow {
 }
 
 /// The flag of this run that deals with a finding about the samples as recorded.
-fn answered(code: &str, plan: &Plan) -> Option<&'static str> {
+fn answered(code: &str, plan: &EstimationSettings) -> Option<&'static str> {
     let (is_given, flag) = match code {
         "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
         "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),

@@ -4,7 +4,7 @@
 //! without scripts the pictures stand.
 
 use super::charts::Time;
-use crate::report::plot::{Look, Series};
+use crate::report::plot::{Series, SeriesStyle};
 use crate::web;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -41,7 +41,7 @@ pub(super) fn numbers(time: Time, title: &str, unit: &str, series: &[Series]) ->
         }
         breaks.retain(|at| *at < t.len());
         json!({
-            "name": series.name, "color": series.color.unwrap_or(index), "dashed": series.look == Look::Dashed,
+            "name": series.name, "color": series.color.unwrap_or(index), "dashed": series.look == SeriesStyle::Dashed,
             "t": t, "v": v, "breaks": breaks,
         })
     });

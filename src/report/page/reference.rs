@@ -55,20 +55,26 @@ pub(super) fn section(
         &rows,
     ));
     say_left_out(errors, out);
-    if let Some((found, _)) = &errors.bounds {
-        let judged = against::beyond_sigma(found)
-            .map_or_else(|| "Sigma holds".to_owned(), |beyond| sentence(&beyond));
-        let _ = writeln!(
-            out,
-            "<p id=\"within-sigma\">{}. {}; {}.</p>",
-            escaped(&judged),
-            escaped(&sentence(&against::within_sigma(found))),
-            against::alignment(found.align)
-        );
-    }
+    say_within_sigma(errors, out);
     if let Some((time, stretches)) = drawn {
         draw(errors, time, stretches, out);
     }
+}
+
+/// Says whether the errors lie within the estimate's own sigma, where it has one.
+fn say_within_sigma(errors: &Errors, out: &mut String) {
+    let Some((found, _)) = &errors.bounds else {
+        return;
+    };
+    let judged = against::beyond_sigma(found)
+        .map_or_else(|| "Sigma holds".to_owned(), |beyond| sentence(&beyond));
+    let _ = writeln!(
+        out,
+        "<p id=\"within-sigma\">{}. {}; {}.</p>",
+        escaped(&judged),
+        escaped(&sentence(&against::within_sigma(found))),
+        against::alignment(found.align)
+    );
 }
 
 /// Reason for which no error can be given.

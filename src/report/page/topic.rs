@@ -168,6 +168,11 @@ fn plots(s: &TopicSummary, drawn: &Drawn, stretches: usize, out: &mut String) {
             drawn.series.samples
         );
     }
+    say_jumps(drawn, time, out);
+}
+
+/// Says where the clock jumps.
+fn say_jumps(drawn: &Drawn, time: Time, out: &mut String) {
     for (at, nanos) in drawn.elapsed.kept.iter().take(TOLD) {
         let _ = writeln!(
             out,

@@ -12,15 +12,15 @@ mod announce;
 mod back_pressure;
 mod complaints;
 mod counters;
-mod latecomers;
+mod last_attitude;
 mod places;
 mod polling;
-mod referring;
 mod report;
 mod resetting;
 mod saving;
 mod settings;
 mod tables;
+mod truth;
 
 pub use back_pressure::Flood;
 pub use complaints::Complaint;
@@ -37,8 +37,8 @@ use super::channel::{Channel, Items};
 use super::outbox::Outbox;
 use super::outgoing::Outgoing;
 use super::recorder::Handle;
-use super::stream::run::{Placed, SampleRun};
-use super::stream::stamps::Taken;
+use super::stream::run::{OrderedBy, SampleRun};
+use super::stream::stamps::TimedSamples;
 use super::stream::{Fate, SensorStream, live_plan};
 use crate::error::{Error, Result};
 use crate::serve::guard::admission::Token;
@@ -430,7 +430,7 @@ impl Hub {
         sensor: &mut Sensor,
         lines: &[(Option<u64>, usize)],
         samples: &[RawSample],
-        (placed, first): (Placed, (u64, &[u8])),
+        (placed, first): (OrderedBy, (u64, &[u8])),
         text: &mut Vec<u8>,
     ) -> std::result::Result<Feedback, Fault> {
         let id = &sensor.stream.id().clone();
@@ -489,8 +489,8 @@ impl Hub {
             return;
         }
         let id = sensor.stream.id().clone();
-        let Taken { lines, samples } = sensor.stream.overdue();
-        let stands = (Placed::ByStamp, (0, &[][..]));
+        let TimedSamples { lines, samples } = sensor.stream.overdue();
+        let stands = (OrderedBy::ByStamp, (0, &[][..]));
         let feedback = self.integrate(sensor, &lines, &samples, stands, &mut Vec::new());
         let (note, faults) = match feedback {
             Ok(feedback) => (feedback.note, feedback.faults),

@@ -6,7 +6,7 @@
 //!
 //! Long because all of it is under one lock: what is queued, what gives way and what is owed agree at every moment.
 
-use super::last::Last;
+use super::last_attitude::Last;
 use crate::serve::protocol::chunk::{Chunk, Dropped, Encode, MAX_QUEUED, NOTE};
 use crate::serve::protocol::filter::{Class, Filter};
 use crate::serve::protocol::foxglove::frames;
@@ -68,7 +68,7 @@ struct State {
     /// Replies that were taken and have not left.
     leaving: usize,
     /// The answer to `POLL`: one at most, which may be larger than all others and is shared by all.
-    status: Asked,
+    status: StatusReply,
     data: VecDeque<Chunk>,
     /// Number of pieces that have ever left `data`.
     left: u64,
@@ -104,7 +104,7 @@ struct State {
 
 /// State of an answer that is made for all who ask.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-enum Asked {
+enum StatusReply {
     /// Nobody has asked.
     #[default]
     Not,
@@ -221,23 +221,23 @@ impl Outbox {
     /// The state is asked for, and its answer is to come. `false`: it was before, and has not left.
     pub fn ask(&self) -> bool {
         let status = &mut self.state().status;
-        let is_first = *status == Asked::Not;
+        let is_first = *status == StatusReply::Not;
         if is_first {
-            *status = Asked::For;
+            *status = StatusReply::For;
         }
         is_first
     }
 
     /// Queues the answer to who has [asked](Outbox::ask).
     pub fn answer(&self, line: Bytes) {
-        self.state().status = Asked::Made(line);
+        self.state().status = StatusReply::Made(line);
         self.wake.notify_one();
     }
 
     /// Whether an answer is to come, or has not left.
     #[must_use]
     pub fn owes_answer(&self) -> bool {
-        self.state().status != Asked::Not
+        self.state().status != StatusReply::Not
     }
 
     /// Whether so many replies wait that no more may be asked for.
@@ -411,8 +411,9 @@ impl Outbox {
         state.leaving += state.control.len();
         out.extend(state.control.drain(..));
         state.control_bytes = 0;
-        if matches!(state.status, Asked::Made(_))
-            && let Asked::Made(line) = std::mem::replace(&mut state.status, Asked::Taken)
+        if matches!(state.status, StatusReply::Made(_))
+            && let StatusReply::Made(line) =
+                std::mem::replace(&mut state.status, StatusReply::Taken)
         {
             out.push_back(line);
         }
@@ -477,10 +478,10 @@ impl Outbox {
     /// All that was taken has left, this many bytes of attitudes among it.
     pub fn written(&self, bytes: usize) {
         let mut state = self.state();
-        let had_replies = state.leaving > 0 || state.status == Asked::Taken;
+        let had_replies = state.leaving > 0 || state.status == StatusReply::Taken;
         state.leaving = 0;
-        if state.status == Asked::Taken {
-            state.status = Asked::Not;
+        if state.status == StatusReply::Taken {
+            state.status = StatusReply::Not;
         }
         if bytes > 0 {
             state.queued = state.queued.saturating_sub(bytes);
@@ -513,7 +514,7 @@ impl Outbox {
     fn is_empty(&self) -> bool {
         let state = self.state();
         state.control.is_empty()
-            && !matches!(state.status, Asked::Made(_))
+            && !matches!(state.status, StatusReply::Made(_))
             && state.data.is_empty()
             && state.lasts.is_empty()
             && state.gaps.is_empty()

@@ -2,7 +2,7 @@
 //!
 //! Apart from the sessions because what is posted is gathered in the same way.
 
-use super::stream::run::{Placed, SampleRun};
+use super::stream::run::{OrderedBy, SampleRun};
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Bare, Line};
 use strapd_recording::text::MAX_NEAR;
@@ -78,7 +78,7 @@ impl RunBuilder {
             client,
             head: self.head.as_ref()?,
             received,
-            placed: Placed::ByStamp,
+            placed: OrderedBy::ByStamp,
             lines: &self.lines,
             samples: self.samples.get(..until).unwrap_or(&self.samples),
             bare: &self.bare,

@@ -32,7 +32,7 @@ use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Line;
 use strapd_recording::decode::framing::Framer;
-use turn::{Held, Step};
+use turn::{PendingBytes, WorkSlice};
 
 /// Errors said at once before they are thinned.
 const BURST: u32 = 64;
@@ -99,9 +99,9 @@ pub struct Session {
     owned: Owned,
     /// Meaning of packed samples by number, as lines would state it.
     bound: BTreeMap<u32, Result<Line, Box<Fault>>>,
-    step: Step,
+    step: WorkSlice,
     /// Bytes that wait for the next step.
-    held: Option<Held>,
+    held: Option<PendingBytes>,
     /// Words it is told at the end, after a while.
     last_words: Option<(Duration, Bytes)>,
     end: Option<End>,
@@ -128,7 +128,7 @@ impl Session {
         let (authorised, opening) = match side {
             Side::Client { trusted } => (trusted || hub.token().is_none(), Opening::Blank),
             // A datagram stands alone, and whom to listen to otherwise was chosen here.
-            Side::Deaf { trusted } => (trusted || hub.token().is_none(), Opening::Over),
+            Side::ListenOnly { trusted } => (trusted || hub.token().is_none(), Opening::Over),
             Side::Source(_) => (true, Opening::Over),
         };
         if let Some(place) = hub.place().filter(|_| authorised) {
@@ -147,7 +147,7 @@ impl Session {
             told: BTreeSet::new(),
             owned: Owned::default(),
             bound: BTreeMap::new(),
-            step: Step::default(),
+            step: WorkSlice::default(),
             held: None,
             last_words: None,
             end: None,
@@ -230,7 +230,7 @@ impl Session {
     pub fn events(&mut self) -> Vec<Event> {
         match &mut self.side {
             Side::Source(naming) => std::mem::take(&mut naming.events),
-            Side::Client { .. } | Side::Deaf { .. } => Vec::new(),
+            Side::Client { .. } | Side::ListenOnly { .. } => Vec::new(),
         }
     }
 

@@ -28,16 +28,16 @@ use intervals::Intervals;
 pub use losing::Fate;
 use losing::Losing;
 use resetting::Resetting;
-use run::{Placed, SampleRun, Span, Standing};
+use run::{OrderedBy, RunPlacement, SampleRun, Span};
 use stamp_unit::StampUnit;
-use stamps::{Stamps, Taken};
+use stamps::{Stamps, TimedSamples};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Aid, Forces, Memory, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings, Forces, Memory};
 use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
@@ -118,7 +118,7 @@ enum Joining {
 ///
 /// # Errors
 /// In words, with the flag that helps: what a live stream cannot do.
-pub fn live_plan(plan: &Plan) -> Result<Plan, Diagnostic> {
+pub fn live_plan(plan: &EstimationSettings) -> Result<EstimationSettings, Diagnostic> {
     let mut plan = plan.clone();
     if plan.method == Method::Auto {
         plan.method = Method::COMMIT;
@@ -146,7 +146,7 @@ impl SensorStream {
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
     pub fn new(
-        plan: &Plan,
+        plan: &EstimationSettings,
         id: Arc<str>,
         stated: &Line,
         together: &[RawSample],
@@ -224,7 +224,7 @@ impl SensorStream {
 
     /// Whether a later line means the same by its numbers as the first. `plan` wins over both.
     #[must_use]
-    pub fn agrees(&self, plan: &Plan, line: &Line) -> bool {
+    pub fn agrees(&self, plan: &EstimationSettings, line: &Line) -> bool {
         let (kind, unit) = (self.resolved.kind, self.resolved.unit);
         plan.kind.or(line.sample_kind).unwrap_or(kind) == kind
             && plan.unit.or(line.gyro_unit).unwrap_or(unit) == unit
@@ -253,7 +253,7 @@ impl SensorStream {
 
     /// Calibration of the sensor by now. `plan` is that of [`SensorStream::new`].
     #[must_use]
-    pub fn calibration(&self, plan: &Plan) -> SensorCalibration {
+    pub fn calibration(&self, plan: &EstimationSettings) -> SensorCalibration {
         let filter = self.estimator.filter();
         let known = learned((plan, &self.resolved, &self.prepared), filter, None);
         calibration::described(known, &self.id, "live", self.last.as_ref())
@@ -270,7 +270,7 @@ impl SensorStream {
 
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
     /// are. Those whose stamps are bare numbers wait for the unit of all.
-    pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<Taken> {
+    pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<TimedSamples> {
         let bare = run.bare.iter().flatten().next();
         if self.joining == Joining::Undecided
             && let Some(bare) = bare
@@ -298,7 +298,7 @@ impl SensorStream {
     }
 
     /// Takes those that wait for the unit of their stamps, when nobody is to wait any longer.
-    pub fn overdue(&mut self) -> Taken {
+    pub fn overdue(&mut self) -> TimedSamples {
         let (taken, why) = self.stamps.release(true);
         self.doubt(why);
         taken
@@ -342,10 +342,10 @@ impl SensorStream {
     /// The fault to answer with: a run cannot begin with these samples.
     pub fn join(
         &mut self,
-        plan: &Plan,
+        plan: &EstimationSettings,
         samples: &[RawSample],
         window: Duration,
-        placed: Placed,
+        placed: OrderedBy,
     ) -> Result<Option<Fault>, Fault> {
         if self.joining != Joining::Undecided || samples.iter().all(|raw| raw.is_beside) {
             return Ok(None);
@@ -370,20 +370,20 @@ impl SensorStream {
             (_, None) => return Ok(None),
         };
         match span.standing(stamp, window, placed) {
-            Standing::GoesOn => {
+            RunPlacement::GoesOn => {
                 self.go_on(plan, Some(stamp));
                 Ok(None)
             }
-            Standing::Again => {
+            RunPlacement::Again => {
                 self.joining = Joining::Again(span.last);
                 Ok(None)
             }
-            Standing::Anew => self.begin_anew(plan, raw, stamp, span).map(Some),
+            RunPlacement::Anew => self.begin_anew(plan, raw, stamp, span).map(Some),
         }
     }
 
     /// The run goes on with a sample stamped so.
-    fn go_on(&mut self, plan: &Plan, stamp: Option<Nanos>) {
+    fn go_on(&mut self, plan: &EstimationSettings, stamp: Option<Nanos>) {
         self.joining = Joining::Joined;
         let Some(saved) = self.saved.take() else {
             return;
@@ -407,7 +407,7 @@ impl SensorStream {
     /// A run begins with `raw`: the world is there anew, and only what was counted goes on.
     fn begin_anew(
         &mut self,
-        plan: &Plan,
+        plan: &EstimationSettings,
         raw: &RawSample,
         stamp: Nanos,
         before: Span,
@@ -430,7 +430,7 @@ impl SensorStream {
         }
         let saved = self.saved.take().map(|saved| saved.resets());
         let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
-        estimator.succeed(self.conditioning(), resets);
+        estimator.continue_counts_of(self.conditioning(), resets);
         (self.estimator, self.prepared) = (estimator, prepared);
         (self.first, self.last) = (None, None);
         self.joining = Joining::Joined;
@@ -456,7 +456,7 @@ impl SensorStream {
     }
 
     /// Whether a sample is one that was taken before, and now is only counted.
-    fn is_again(&mut self, plan: &Plan, raw: &RawSample) -> bool {
+    fn is_again(&mut self, plan: &EstimationSettings, raw: &RawSample) -> bool {
         let Joining::Again(last) = self.joining else {
             return false;
         };
@@ -475,7 +475,7 @@ impl SensorStream {
 
     /// Takes samples in the order they came, by the `plan` of [`SensorStream::new`]. The attitudes they
     /// give come from `attitudes`.
-    pub fn take(&mut self, plan: &Plan, seq: Option<u64>, samples: &[RawSample]) {
+    pub fn take(&mut self, plan: &EstimationSettings, seq: Option<u64>, samples: &[RawSample]) {
         if let Some(seq) = seq {
             let expected = self.expected.unwrap_or(seq);
             self.missing = self.missing.saturating_add(seq.saturating_sub(expected));
@@ -503,7 +503,7 @@ impl SensorStream {
     }
 
     /// A specific force or a field with a stamp of its own; until a rate has told where the run stands, it waits.
-    fn take_beside(&mut self, plan: &Plan, raw: &RawSample) {
+    fn take_beside(&mut self, plan: &EstimationSettings, raw: &RawSample) {
         if self.joining == Joining::Joined {
             self.estimator.take(raw);
         } else {
@@ -637,8 +637,8 @@ impl SensorStream {
 }
 
 /// The plan of a sensor whose specific forces are known to come in messages of their own.
-fn expecting(plan: &Plan, forces_beside: bool) -> Plan {
-    Plan {
+fn expecting(plan: &EstimationSettings, forces_beside: bool) -> EstimationSettings {
+    EstimationSettings {
         has_forces_beside: plan.has_forces_beside || forces_beside,
         ..plan.clone()
     }

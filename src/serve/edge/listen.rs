@@ -193,7 +193,7 @@ fn prepare(stream: &tokio::net::TcpStream) {
 }
 
 /// Kind of a connection of lines before it has said anything.
-fn unheard(hub: &Hub) -> Kind {
+fn initial_kind(hub: &Hub) -> Kind {
     match hub.token() {
         None => Kind::Served,
         Some(_) => Kind::Unproven,

@@ -28,7 +28,7 @@ const MAX_BODY: usize = 1 << 20;
 /// Query that the address may have.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(in crate::serve) struct Asked {
+pub(in crate::serve) struct SamplesQuery {
     /// Names the sensor where an object does not.
     id: Option<String>,
 }
@@ -43,7 +43,7 @@ enum Form {
 /// Answers a `POST`.
 pub(in crate::serve) async fn post(
     Extension(connection): Extension<Connection>,
-    asked: Result<Query<Asked>, QueryRejection>,
+    asked: Result<Query<SamplesQuery>, QueryRejection>,
     request: Request<Body>,
 ) -> Response<Body> {
     let hub = &connection.hub;

@@ -3,8 +3,8 @@
 //! A gyro stream looks harmless, but a page in any browser can reach loopback: so names and
 //! origins are checked, and beyond loopback a token is needed.
 
+use super::failed_logins::Strangers;
 use super::fault::Fault;
-use super::strangers::Strangers;
 use crate::client::secret::Secret;
 use crate::error::Result;
 use sha2::{Digest, Sha256};

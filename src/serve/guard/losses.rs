@@ -72,12 +72,12 @@ struct Loss {
     is_whole: bool,
     since: Instant,
     last: Instant,
-    told: Option<Told>,
+    told: Option<LossReport>,
 }
 
 /// Report of a loss: when, of how many samples, and how often.
 #[derive(Clone, Copy, Debug)]
-struct Told {
+struct LossReport {
     at: Instant,
     total: u64,
     times: u32,
@@ -255,7 +255,7 @@ impl State {
     /// Reports a loss: once for all that come from one place for one cause, and no more lines than may be.
     fn tell(&mut self, key: &(String, &'static str), now: Instant) -> Vec<String> {
         let mut said = self.turn(now);
-        let (host, is_fresh) = (host(&key.0), |told: &Told| {
+        let (host, is_fresh) = (host(&key.0), |told: &LossReport| {
             now.saturating_duration_since(told.at) < AGAIN
         });
         let is_said = self.known.iter().any(|(other, loss)| {
@@ -271,7 +271,7 @@ impl State {
             self.lines += 1;
             said.push(loss.words(&key.0));
         }
-        loss.told = Some(Told {
+        loss.told = Some(LossReport {
             at: now,
             total: loss.total,
             times: loss.told.map_or(1, |told| told.times.saturating_add(1)),

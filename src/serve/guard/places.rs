@@ -34,11 +34,11 @@ pub trait Guest: std::fmt::Debug + Send + Sync {
 pub struct Places {
     limits: Limits,
     began: Instant,
-    taken: Mutex<Taken>,
+    taken: Mutex<SeatTable>,
 }
 
 #[derive(Debug, Default)]
-struct Taken {
+struct SeatTable {
     next: u64,
     seats: BTreeMap<u64, Seat>,
 }
@@ -84,7 +84,7 @@ impl Places {
         }
     }
 
-    fn taken(&self) -> MutexGuard<'_, Taken> {
+    fn taken(&self) -> MutexGuard<'_, SeatTable> {
         // Every change is whole before anything could panic.
         self.taken.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -146,7 +146,7 @@ impl Places {
     }
 
     /// Sees to it that one more of a kind has room; `None`: there is none, and nobody has to go.
-    fn make_room(&self, taken: &mut Taken, kind: Kind) -> Option<()> {
+    fn make_room(&self, taken: &mut SeatTable, kind: Kind) -> Option<()> {
         let of_kind = || taken.seats.iter().filter(|(_, seat)| seat.kind == kind);
         if of_kind().count() < self.room(kind) {
             return Some(());

@@ -12,13 +12,13 @@ use tokio::time::timeout;
 /// is there, then everybody sends what waits.
 #[derive(Debug)]
 pub struct Shutdown {
-    step: watch::Sender<Step>,
+    step: watch::Sender<ShutdownStage>,
     reading: (mpsc::Sender<()>, mpsc::Receiver<()>),
     working: (mpsc::Sender<()>, mpsc::Receiver<()>),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Step {
+enum ShutdownStage {
     Serve,
     Read,
     Send,
@@ -27,7 +27,7 @@ enum Step {
 /// A task's end of it. While one exists, its task counts as running.
 #[derive(Clone, Debug)]
 pub struct Running {
-    step: watch::Receiver<Step>,
+    step: watch::Receiver<ShutdownStage>,
     reading: Option<mpsc::Sender<()>>,
     _working: mpsc::Sender<()>,
 }
@@ -35,7 +35,7 @@ pub struct Running {
 impl Default for Shutdown {
     fn default() -> Shutdown {
         Shutdown {
-            step: watch::Sender::new(Step::Serve),
+            step: watch::Sender::new(ShutdownStage::Serve),
             reading: mpsc::channel(1),
             working: mpsc::channel(1),
         }
@@ -62,10 +62,10 @@ impl Shutdown {
             working: (worker, mut worked),
         } = self;
         drop((reader, worker));
-        step.send_replace(Step::Read);
+        step.send_replace(ShutdownStage::Read);
         // Nothing is ever sent: it ends when the last sender has gone.
         let _ = timeout(reading, read.recv()).await;
-        step.send_replace(Step::Send);
+        step.send_replace(ShutdownStage::Send);
         let _ = worked.recv().await;
     }
 }
@@ -73,7 +73,7 @@ impl Shutdown {
 impl Running {
     /// Waits until it is time to end: then read what is there and call [`Running::has_read`].
     pub async fn asked(&mut self) {
-        self.reached(Step::Read).await;
+        self.reached(ShutdownStage::Read).await;
     }
 
     /// Everything that had arrived was read.
@@ -83,16 +83,20 @@ impl Running {
 
     /// Waits until everybody has read: then send what waits and end.
     pub async fn asked_to_send(&mut self) {
-        self.reached(Step::Send).await;
+        self.reached(ShutdownStage::Send).await;
     }
 
     /// [`Running::asked`], or [`Running::asked_to_send`] for a task that was `asked` already.
     pub async fn asked_further(&mut self, asked: bool) {
-        self.reached(if asked { Step::Send } else { Step::Read })
-            .await;
+        self.reached(if asked {
+            ShutdownStage::Send
+        } else {
+            ShutdownStage::Read
+        })
+        .await;
     }
 
-    async fn reached(&mut self, wanted: Step) {
+    async fn reached(&mut self, wanted: ShutdownStage) {
         // An error means that the daemon has gone altogether.
         let _ = self.step.wait_for(|step| *step >= wanted).await;
     }

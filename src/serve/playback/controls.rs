@@ -334,18 +334,7 @@ impl Timeline for Playback {
                 let Some(start) = state.start else {
                     return refuse("nothing has been read yet, so there is no place to go to");
                 };
-                let to = to.max(start);
-                let is_ahead = state.mode != Mode::Ended
-                    && !state.restart
-                    && state.at.is_none_or(|at| to > at);
-                if is_ahead {
-                    state.until = Some(to);
-                } else {
-                    state.rewind(Some(to))?;
-                }
-                if state.mode == Mode::Ended {
-                    state.mode = Mode::Paused;
-                }
+                state.seek(to.max(start))?;
                 leaps = true;
             }
         }
@@ -359,6 +348,21 @@ impl Timeline for Playback {
 }
 
 impl State {
+    /// Goes to `to`: on, unseen, where it lies ahead, else from the start again.
+    fn seek(&mut self, to: Nanos) -> Result<(), Fault> {
+        let is_ahead =
+            self.mode != Mode::Ended && !self.restart && self.at.is_none_or(|at| to > at);
+        if is_ahead {
+            self.until = Some(to);
+        } else {
+            self.rewind(Some(to))?;
+        }
+        if self.mode == Mode::Ended {
+            self.mode = Mode::Paused;
+        }
+        Ok(())
+    }
+
     /// Runs again from the start, unseen up to `to`.
     fn rewind(&mut self, to: Option<Nanos>) -> Result<(), Fault> {
         if let Some(why) = self.forward_only {

@@ -6,7 +6,7 @@ use crate::serve::core::channel::{Channel, Items};
 use crate::serve::core::hub::Hub;
 use crate::serve::core::stream::{SensorStream, live_plan};
 use std::sync::Arc;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::decode::Line;
 
@@ -15,7 +15,7 @@ use strapd_recording::decode::Line;
 pub(super) struct Estimated {
     /// Channel as clients know it, over all runs.
     channel: Option<Arc<Channel>>,
-    run: Option<(Plan, SensorStream)>,
+    run: Option<(EstimationSettings, SensorStream)>,
     /// Whether it failed: logged once, and not tried again.
     failed: bool,
 }
@@ -68,10 +68,10 @@ impl Estimated {
         id: &Arc<str>,
         kind: SampleKind,
         samples: &[RawSample],
-    ) -> Result<(Plan, SensorStream), String> {
-        let plan = live_plan(&Plan {
+    ) -> Result<(EstimationSettings, SensorStream), String> {
+        let plan = live_plan(&EstimationSettings {
             aid: Aid::Auto,
-            ..Plan::default()
+            ..EstimationSettings::default()
         })
         .map_err(|why| why.to_string())?;
         let stated = Line {

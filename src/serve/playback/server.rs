@@ -27,7 +27,7 @@ const AT_ONCE: usize = 256;
 
 /// A run that is served.
 #[derive(Debug)]
-pub struct Cast {
+pub struct PlaybackServer {
     hub: Arc<Hub>,
     playback: Arc<Playback>,
     addresses: Vec<Listen>,
@@ -82,7 +82,7 @@ pub enum Next {
     Done,
 }
 
-impl Cast {
+impl PlaybackServer {
     /// Listens, on everything or on nothing. `forever`: after the end it stays, for who may want to go
     /// back, until a signal. `signals`: the first one ends the run in order, the second one at once.
     ///
@@ -93,7 +93,7 @@ impl Cast {
         playback: Playback,
         forever: bool,
         signals: bool,
-    ) -> Result<Cast> {
+    ) -> Result<PlaybackServer> {
         let playback = Arc::new(playback);
         settings.hub.timeline = Some(playback.clone());
         let failed = |e: std::io::Error| Error::usage(format!("cannot serve: {e}"));
@@ -118,7 +118,7 @@ impl Cast {
                 drained
             })
             .map_err(failed)?;
-        Ok(Cast {
+        Ok(PlaybackServer {
             hub,
             playback,
             addresses,
@@ -210,7 +210,7 @@ impl Cast {
     }
 }
 
-impl Audience for Cast {
+impl Audience for PlaybackServer {
     // The streams are those of the run before, if there was one.
     fn begin(&self, streams: &[Stream]) {
         for lane in lock(&self.recorded).values_mut() {
@@ -235,8 +235,8 @@ impl Audience for Cast {
         self.playback.length(secs);
     }
 
-    fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<audience::Turn> {
-        let of = |count, is_shown| Some(audience::Turn { count, is_shown });
+    fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<audience::Grant> {
+        let of = |count, is_shown| Some(audience::Grant { count, is_shown });
         loop {
             let (grant, notice) = self.playback.grant((0..count).map(due));
             if notice != Notice::Nothing {
@@ -312,7 +312,7 @@ impl Audience for Cast {
     }
 }
 
-impl Drop for Cast {
+impl Drop for PlaybackServer {
     fn drop(&mut self) {
         self.finish();
     }

@@ -3,15 +3,15 @@
 
 use crate::made_logs::{motion, written};
 use crate::replays::{assert_rotations, attitudes, done, only, replay_with};
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 
-fn plan(method: Method, kind: SampleKind) -> Plan {
-    Plan {
+fn plan(method: Method, kind: SampleKind) -> EstimationSettings {
+    EstimationSettings {
         method,
         kind: Some(kind),
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
@@ -26,7 +26,7 @@ fn the_shortest_logs_give_an_attitude_for_each_sample_or_say_that_there_is_none(
             SampleKind::DeltaAngle,
         ] {
             for name in super::method_names() {
-                let plan = Plan {
+                let plan = EstimationSettings {
                     regularise_stamps: n == 5,
                     ..plan(super::method_named(name), kind)
                 };
@@ -44,8 +44,8 @@ fn the_shortest_logs_give_an_attitude_for_each_sample_or_say_that_there_is_none(
 fn a_topic_without_a_sample_says_so() {
     let dir = tempfile::tempdir().unwrap();
     let path = written(dir.path(), "log.mcap", &[]);
-    let said =
-        done(&replay_with(&path, Plan::default())).map_or_else(|e| e.to_string(), |s| s.text());
+    let said = done(&replay_with(&path, EstimationSettings::default()))
+        .map_or_else(|e| e.to_string(), |s| s.text());
     assert!(
         said.contains("no sample") || said.contains("no IMU topic") || said.contains("no messages"),
         "{said}"
@@ -71,7 +71,7 @@ fn a_window_that_no_sample_kind_has_is_a_usage_error_and_one_of_this_log_names_t
         order: Order::M4,
         placement: Placement::Centred,
     };
-    let unsaid = Plan {
+    let unsaid = EstimationSettings {
         kind: None,
         ..plan(one, SampleKind::Rate)
     };

@@ -1,13 +1,13 @@
 //! The text of a calibration: written, read, written the same; and what is none.
 
 use strapd::config::calibration::{parse, text_of};
-use strapd_attitude::estimate::{Known, SensorCalibration};
+use strapd_attitude::estimate::{CalibrationTerm, SensorCalibration};
 
 /// Small multiples of it have no more than the nine digits that are written: 2^-12.
 const STEP: f64 = 0.000_244_140_625;
 
 fn full() -> SensorCalibration {
-    let known = |value| Known {
+    let known = |value| CalibrationTerm {
         value,
         sigma: Some([1e-3, 2e-3, 3e-3]),
         observed: [true, false, true],
@@ -17,13 +17,13 @@ fn full() -> SensorCalibration {
         for (i, v) in value.iter_mut().enumerate() {
             *v = scale * (i as f64 - 4.0);
         }
-        Known {
+        CalibrationTerm {
             value,
             sigma: Some([2.5e-4; 9]),
             observed: [true; 9],
         }
     };
-    let one = |value| Known {
+    let one = |value| CalibrationTerm {
         value: [value],
         sigma: None,
         observed: [true],

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use strapd::inspection::{Checked, CheckedTopic};
 use strapd::pipeline::check::{Examination, check, examine};
 use strapd::pipeline::inspection::look;
-use strapd::pipeline::logged;
+use strapd::pipeline::opening;
 use strapd::report::findings::findings;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_recording::Recording;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
@@ -40,12 +40,12 @@ fn several(dir: &Path, topics: usize, samples: usize) -> PathBuf {
 }
 
 fn surveyed(path: &Path, pool: &Pool) -> Recording {
-    Recording::of(&logged::open(path).unwrap(), &Options::default(), pool).unwrap()
+    Recording::of(&opening::open(path).unwrap(), &Options::default(), pool).unwrap()
 }
 
 fn checked(path: &Path, named: Option<&str>) -> Checked {
     check(
-        &logged::open(path).unwrap(),
+        &opening::open(path).unwrap(),
         named,
         &Options::default(),
         &Pool::new(2).unwrap(),
@@ -83,9 +83,9 @@ fn a_topic_that_is_refused_keeps_no_other_from_being_told_about() {
     // None of them rests, so no bias can be found: each is refused, and each says so.
     let examination = Examination {
         selection: strapd_recording::Selection::default(),
-        plan: Plan {
+        plan: EstimationSettings {
             bias: strapd_attitude::estimate::Bias::Auto,
-            ..Plan::default()
+            ..EstimationSettings::default()
         },
         reference_topic: String::new(),
         drawing: None,
@@ -93,7 +93,7 @@ fn a_topic_that_is_refused_keeps_no_other_from_being_told_about() {
     };
     let pool = Pool::new(2).unwrap();
     let checked = examine(
-        &logged::open(&path).unwrap(),
+        &opening::open(&path).unwrap(),
         &examination,
         &pool,
         &mut |_| {},
@@ -112,7 +112,7 @@ fn all_topics_are_replayed_in_one_pass() {
     let path = several(dir.path(), 40, 300);
     let examination = Examination {
         selection: strapd_recording::Selection::default(),
-        plan: Plan::default(),
+        plan: EstimationSettings::default(),
         reference_topic: String::new(),
         drawing: None,
         command: String::new(),
@@ -120,7 +120,7 @@ fn all_topics_are_replayed_in_one_pass() {
     let mut places: Vec<f64> = Vec::new();
     let pool = Pool::new(2).unwrap();
     let checked = examine(
-        &logged::open(&path).unwrap(),
+        &opening::open(&path).unwrap(),
         &examination,
         &pool,
         &mut |position| {

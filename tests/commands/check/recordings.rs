@@ -3,7 +3,7 @@
 use super::{codes, flags, found, notes};
 use crate::replays::{done, only, replay_with};
 use crate::shared_data::shared;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::record::SampleKind;
 
 /// File, errors and warnings. The Xsens samples are averages (see `fixtures/README.md`), which is
@@ -120,9 +120,9 @@ fn the_advice_on_the_meaning_of_a_sample_reduces_the_error() {
         let median = |kind: Option<SampleKind>| {
             let mut replay = replay_with(
                 &path,
-                Plan {
+                EstimationSettings {
                     kind,
-                    ..Plan::default()
+                    ..EstimationSettings::default()
                 },
             );
             replay.selection.topic = Some(topic.to_owned());

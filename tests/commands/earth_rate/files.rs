@@ -5,7 +5,7 @@ use crate::made_logs::{ImuSample, START, STEP, written};
 use crate::replays::{attitudes, done, only, replay_with, target};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
-use strapd_attitude::estimate::{Bias, Initial, Plan};
+use strapd_attitude::estimate::{Bias, EstimationSettings, Initial};
 use strapd_attitude::frames::{Body, In, Nav};
 use strapd_attitude::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use strapd_attitude::worlds::{Convention, World};
@@ -34,13 +34,13 @@ fn still(q_nb: &Quaternion<Nav, Body>, moving: usize) -> Vec<ImuSample> {
         .collect()
 }
 
-fn plan(world: World) -> Plan {
-    Plan {
+fn plan(world: World) -> EstimationSettings {
+    EstimationSettings {
         world,
         initial: Initial::FirstOrientation,
         bias: Bias::Auto,
         latitude_deg: Some(LATITUDE.to_degrees()),
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
@@ -84,7 +84,7 @@ fn a_bias_from_rest_does_not_swallow_the_earth() {
         assert!(topic.warnings().iter().all(|w| !w.contains("--earth-rate")));
     }
     // Without the flag the Earth is taken for bias, as it always was.
-    let without = Plan {
+    let without = EstimationSettings {
         latitude_deg: None,
         ..plan(World::Enu)
     };
@@ -108,7 +108,7 @@ fn a_bias_without_a_rest_at_the_start_is_refused() {
         "{said}"
     );
     // Without the flag that rest does.
-    let without = Plan {
+    let without = EstimationSettings {
         latitude_deg: None,
         ..plan(World::Enu)
     };
@@ -124,7 +124,7 @@ fn an_unknown_heading_is_warned_of_with_its_size() {
         roll: -0.2,
     });
     let path = written(dir.path(), "log.mcap", &still(&level, 0));
-    let plan = Plan {
+    let plan = EstimationSettings {
         initial: Initial::Gravity,
         bias: Bias::Given(BodyRate(BIAS.into())),
         ..plan(World::Enu)
@@ -147,7 +147,7 @@ fn an_unknown_heading_is_warned_of_with_its_size() {
 
 #[test]
 fn what_can_not_be_is_refused_before_anything_is_read() {
-    let refused = |plan: Plan| plan.check().unwrap_err().to_string();
+    let refused = |plan: EstimationSettings| plan.check().unwrap_err().to_string();
     let said = refused(plan(World::Start));
     for flag in [
         "earth_rate",
@@ -158,14 +158,14 @@ fn what_can_not_be_is_refused_before_anything_is_read() {
         assert!(said.contains(flag), "{said}");
     }
     for latitude in [90.1, -91.0, f64::NAN, f64::INFINITY] {
-        let said = refused(Plan {
+        let said = refused(EstimationSettings {
             latitude_deg: Some(latitude),
             ..plan(World::Ned)
         });
         assert!(said.contains("between -90 and 90"), "{said}");
     }
     for latitude in [-90.0, 0.0, 90.0] {
-        let plan = Plan {
+        let plan = EstimationSettings {
             latitude_deg: Some(latitude),
             ..plan(World::Ned)
         };
@@ -210,7 +210,7 @@ fn summary_and_metadata_state_it() {
         "{metadata:?}"
     );
     // The gyro's rate, Earth's included: bias taken out, and no more.
-    let without = Plan {
+    let without = EstimationSettings {
         latitude_deg: None,
         ..plan(World::Enu)
     };

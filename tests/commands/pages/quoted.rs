@@ -10,12 +10,14 @@ mod example {
     #![allow(unreachable_pub)]
     // The README's.
     use strapd_attitude::diagnostic::Diagnostic;
-    use strapd_attitude::estimate::{Estimator, Meaning, Patience, Plan, Preparation};
+    use strapd_attitude::estimate::{
+        EstimationSettings, Estimator, Meaning, Patience, Preparation,
+    };
     use strapd_attitude::propagate::Sequential;
     use strapd_attitude::record::{AttitudeSample, Declared, RawSample};
 
     pub fn attitudes(samples: &[RawSample]) -> Result<Vec<AttitudeSample>, Diagnostic> {
-        let plan = Plan::default(); // the flags of `replay`, as fields
+        let plan = EstimationSettings::default(); // the flags of `replay`, as fields
         let meaning = Meaning::new(&plan, &Declared::default()); // rad/s at the stamps, x forward, y left, z up
         let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);
         for sample in samples {

@@ -8,7 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use strapd::pipeline::replay::run;
 use strapd_attitude::condition::Clock;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_recording::pool::Pool;
 
 /// Stamps off even ones by up to 3 % of the step, as a lattice.
@@ -20,10 +20,10 @@ fn jittered(n: usize) -> Vec<ImuSample> {
     samples
 }
 
-fn regularised() -> Plan {
-    Plan {
+fn regularised() -> EstimationSettings {
+    EstimationSettings {
         regularise_stamps: true,
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
@@ -44,7 +44,7 @@ fn lines_of(dir: &Path, samples: &[ImuSample]) -> PathBuf {
 
 #[test]
 fn stamps_stay_unless_one_asks() {
-    assert!(!Plan::default().regularise_stamps);
+    assert!(!EstimationSettings::default().regularise_stamps);
     let dir = tempfile::tempdir().unwrap();
     let samples = jittered(1000);
     let path = written(dir.path(), "log.mcap", &samples);
@@ -161,7 +161,7 @@ fn a_log_without_a_rate_is_refused_before_anything_is_written() {
 
 #[test]
 fn index_time_has_nothing_to_regularise() {
-    let plan = Plan {
+    let plan = EstimationSettings {
         clock: Clock::Index { rate_hz: 100.0 },
         ..regularised()
     };

@@ -6,22 +6,22 @@ use crate::replays::{Bits, assert_rotations, attitudes, only, replay_with};
 use proptest::prelude::*;
 use std::path::Path;
 use strapd_attitude::condition::OnGap;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::record::{SampleKind, Verdict};
 
 const SAMPLES: usize = 60;
 
-fn plan(kind: SampleKind, method: Method) -> Plan {
-    Plan {
+fn plan(kind: SampleKind, method: Method) -> EstimationSettings {
+    EstimationSettings {
         kind: Some(kind),
         method,
         on_gap: OnGap::Bridge,
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
-fn replayed(dir: &Path, samples: &[ImuSample], plan: &Plan) -> (u64, u64, Vec<Bits>) {
+fn replayed(dir: &Path, samples: &[ImuSample], plan: &EstimationSettings) -> (u64, u64, Vec<Bits>) {
     let path = written(dir, "log.mcap", samples);
     let (summary, attitudes) = attitudes(&replay_with(&path, plan.clone()), dir);
     let counts = only(&summary).counts;
@@ -137,7 +137,10 @@ fn a_log_of_nothing_but_nan_ends_with_a_count_and_without_an_attitude() {
         sample.gyro = [f64::NAN; 3];
     }
     let path = written(dir.path(), "nan.mcap", &samples);
-    let (summary, attitudes) = attitudes(&replay_with(&path, Plan::default()), dir.path());
+    let (summary, attitudes) = attitudes(
+        &replay_with(&path, EstimationSettings::default()),
+        dir.path(),
+    );
     assert!(attitudes.is_empty());
     assert_eq!(only(&summary).counts.get(Verdict::NotFinite), 50);
     assert!(summary.is_lossy());
@@ -154,12 +157,15 @@ fn rates_in_degrees_are_integrated_and_the_flag_is_named() {
         sample.gyro = sample.gyro.map(|w| 4.0 * w.to_degrees());
     }
     let path = written(dir.path(), "deg.mcap", &samples);
-    let (summary, _) = attitudes(&replay_with(&path, Plan::default()), dir.path());
+    let (summary, _) = attitudes(
+        &replay_with(&path, EstimationSettings::default()),
+        dir.path(),
+    );
     let said = only(&summary).warnings().join("; ");
     assert!(said.contains("gyro_unit deg"), "{said}");
-    let plan = Plan {
+    let plan = EstimationSettings {
         unit: Some(strapd_attitude::condition::GyroUnit::Deg),
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let (summary, _) = attitudes(&replay_with(&path, plan), dir.path());
     assert!(only(&summary).warnings().is_empty(), "{summary:?}");

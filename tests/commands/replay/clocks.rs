@@ -4,7 +4,7 @@ use crate::made_logs::{ImuSample, PACKINGS, START, STEP, TOPIC, bytes, logged, m
 use crate::replays::{attitudes, done, only, replay_of, replay_with};
 use strapd::error::Error;
 use strapd_attitude::condition::Clock;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::{SampleKind, Verdict};
 
@@ -53,10 +53,10 @@ fn a_shift_of_every_stamp_by_54_years_changes_no_bit_of_any_attitude() {
             },
         ),
     ] {
-        let plan = Plan {
+        let plan = EstimationSettings {
             kind,
             method,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         let (_, expected) = attitudes(&replay_with(&early, plan.clone()), dir.path());
         assert_eq!(expected.len(), 300);
@@ -99,9 +99,9 @@ fn stamps_that_are_zero_in_both_clocks_are_refused_with_the_flag_that_helps() {
     }
 
     // And the flag does help: the attitudes are those of even stamps.
-    let plan = Plan {
+    let plan = EstimationSettings {
         clock: Clock::Index { rate_hz: 100.0 },
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let (summary, by_index) = attitudes(&replay_with(&path, plan), dir.path());
     assert_eq!(only(&summary).counts.used(), 100);
@@ -122,9 +122,9 @@ fn log_time_and_header_stamp_give_the_same_where_they_agree_but_for_an_offset() 
     let path = dir.path().join("offset.mcap");
     std::fs::write(&path, bytes(PACKINGS[1].1, 4096, &messages)).unwrap();
     let (_, by_header) = attitudes(&replay_of(&path), dir.path());
-    let plan = Plan {
+    let plan = EstimationSettings {
         clock: Clock::Log,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let (summary, by_log) = attitudes(&replay_with(&path, plan), dir.path());
     assert_eq!(only(&summary).clock, "log");
@@ -138,10 +138,10 @@ fn log_time_and_header_stamp_give_the_same_where_they_agree_but_for_an_offset() 
 fn start_and_until_take_the_samples_between_and_count_the_others_as_trimmed() {
     let dir = tempfile::tempdir().unwrap();
     let path = written(dir.path(), "log.mcap", &motion(500));
-    let plan = Plan {
+    let plan = EstimationSettings {
         start: Some(1.0),
         until: Some(3.0),
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let (summary, found) = attitudes(&replay_with(&path, plan), dir.path());
     let topic = only(&summary);
@@ -162,9 +162,9 @@ fn start_and_until_take_the_samples_between_and_count_the_others_as_trimmed() {
 fn a_start_beyond_the_end_leaves_nothing_and_that_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let path = written(dir.path(), "log.mcap", &motion(100));
-    let plan = Plan {
+    let plan = EstimationSettings {
         start: Some(60.0),
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let said = done(&replay_with(&path, plan)).unwrap_err().to_string();
     assert!(said.contains("start 60: none of the 100 samples"), "{said}");

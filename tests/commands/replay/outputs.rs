@@ -5,7 +5,7 @@ use crate::replays::{Bits, attitudes, done, fixture, mcap, only, replay_of, repl
 use crate::shared_data::shared;
 use std::collections::BTreeMap;
 use strapd::error::Error;
-use strapd_attitude::estimate::{Bias, Initial, Plan};
+use strapd_attitude::estimate::{Bias, EstimationSettings, Initial};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::worlds::World;
 
@@ -48,10 +48,10 @@ fn the_initial_attitude_multiplies_from_the_left() {
         ("rpy=180,0,0", [0.0, 1.0, 0.0, 0.0]),
         ("identity", [1.0, 0.0, 0.0, 0.0]),
     ] {
-        let plan = Plan {
+        let plan = EstimationSettings {
             initial: strapd::config::parse_initial(text).unwrap(),
             world: World::Enu,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         let (_, turned) = attitudes(&replay_with(&path, plan), dir.path());
         assert_eq!(turned.len(), plain.len());
@@ -88,11 +88,11 @@ fn gravity_levels_a_body_at_rest_and_its_bias_is_found() {
     let dir = tempfile::tempdir().unwrap();
     let (samples, tilt, bias) = tilted_rest();
     let path = written(dir.path(), "rest.mcap", &samples);
-    let plan = Plan {
+    let plan = EstimationSettings {
         initial: Initial::Gravity,
         bias: Bias::Auto,
         world: World::Enu,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let (summary, found) = attitudes(&replay_with(&path, plan), dir.path());
     // The acceleration is noiseless: rounding alone.
@@ -118,17 +118,17 @@ fn what_only_rest_can_tell_is_refused_on_a_moving_body_with_the_way_out() {
     };
     for (plan, flag, ways_out) in [
         (
-            Plan {
+            EstimationSettings {
                 bias: Bias::Auto,
-                ..Plan::default()
+                ..EstimationSettings::default()
             },
             "bias auto",
             ["bias x,y,z", "bias none"],
         ),
         (
-            Plan {
+            EstimationSettings {
                 initial: Initial::Gravity,
-                ..Plan::default()
+                ..EstimationSettings::default()
             },
             "init gravity",
             ["init identity", "init rpy="],
@@ -155,9 +155,9 @@ fn what_only_rest_can_tell_is_refused_on_a_moving_body_with_the_way_out() {
 fn the_first_orientation_is_where_the_attitude_starts() {
     let path = fixture("xsens_mti.mcap");
     let dir = tempfile::tempdir().unwrap();
-    let plan = Plan {
+    let plan = EstimationSettings {
         initial: Initial::FirstOrientation,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let (summary, found) = attitudes(&replay_with(&path, plan), dir.path());
     // First row of the recording (w, x, y, z), made a unit quaternion: six digits were recorded.
@@ -171,9 +171,9 @@ fn the_first_orientation_is_where_the_attitude_starts() {
 
     let error = {
         let path = written(dir.path(), "none.mcap", &motion(50));
-        let plan = Plan {
+        let plan = EstimationSettings {
             initial: Initial::FirstOrientation,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         done(&replay_with(&path, plan)).unwrap_err().to_string()
     };
@@ -189,9 +189,9 @@ fn px4_in_ned_is_px4_in_enu_seen_from_the_other_convention() {
     };
     let dir = tempfile::tempdir().unwrap();
     let in_world = |world: World| {
-        let plan = Plan {
+        let plan = EstimationSettings {
             world,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         attitudes(&replay_with(&path, plan), dir.path())
     };
@@ -218,10 +218,10 @@ fn px4_in_ned_is_px4_in_enu_seen_from_the_other_convention() {
     }
     // And with an attitude given in each world's own convention, the whole of it.
     let given = |world: World, q: [f64; 4]| {
-        let plan = Plan {
+        let plan = EstimationSettings {
             world,
             initial: Initial::Given(Quaternion::assume_unit(q)),
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         attitudes(&replay_with(&path, plan), dir.path()).1
     };

@@ -10,7 +10,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::error::Error;
 use strapd::pipeline::check::check;
-use strapd::pipeline::logged;
+use strapd::pipeline::opening;
 use strapd_attitude::record::Verdict;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
@@ -192,7 +192,7 @@ fn a_check_of_two_publishers_looks_at_each_and_does_not_advise_to_straighten_the
     for (path, names) in shared_topics(dir.path()) {
         let pool = Pool::new(2).unwrap();
         let checked = check(
-            &logged::open(&path).unwrap(),
+            &opening::open(&path).unwrap(),
             None,
             &Options::default(),
             &pool,

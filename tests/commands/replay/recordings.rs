@@ -6,7 +6,7 @@ use crate::replays::{
 };
 use crate::shared_data::shared;
 use std::path::Path;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::{SampleKind, Verdict};
 
@@ -82,7 +82,7 @@ fn assert_sign_continuous(attitudes: &[Bits], what: &str) {
 }
 
 /// Median of the error of the rotation over 1 s, deg, for "rate", "average", "held".
-fn against(path: &Path, plan: Plan) -> [f64; 3] {
+fn against(path: &Path, plan: EstimationSettings) -> [f64; 3] {
     let mut replay = replay_with(path, plan);
     replay.against = Some(String::new());
     let summary = done(&replay).unwrap();
@@ -109,9 +109,9 @@ fn gyro_alone_meets_the_gates_with_samples_taken_as_means() {
         let Some(path) = shared(&format!("logs/real/{name}.mcap")) else {
             return;
         };
-        let plan = Plan {
+        let plan = EstimationSettings {
             kind: Some(SampleKind::Average),
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         let [rate, average, held] = against(&path, plan);
         eprintln!("{name}: rate {rate:.4}  average {average:.4}  held {held:.4} deg");
@@ -126,13 +126,13 @@ fn gyro_alone_meets_the_gates_with_samples_taken_as_means() {
 fn the_other_meanings_of_a_sample_give_the_table_of_the_recordings() {
     // `logs/README.md`: instantaneous (trapezoid + a x b h^2/12), held. 3 % is the room the issue
     // gives: the table has three digits, and its medians are of nearest, not interpolated, samples.
-    let two_points = Plan {
+    let two_points = EstimationSettings {
         method: Method::Magnus {
             window: 2,
             order: Order::M4,
             placement: Placement::Centred,
         },
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     for (name, rate_table, held_table) in [
         ("broad07_60s_ros2_zstd", 1.469, 2.031),

@@ -8,9 +8,9 @@ use crate::replays::{Bits, attitudes, done, only, replay_by, replay_of, replay_w
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::pipeline::check::check;
-use strapd::pipeline::logged;
+use strapd::pipeline::opening;
 use strapd::report::findings::findings;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::record::{SampleKind, Verdict};
 use strapd_recording::decode::{Channel, Rank, role};
 use strapd_recording::pool::Pool;
@@ -228,9 +228,9 @@ fn stamps_in_whole_seconds_give_every_sample_within_the_logs_span_wherever_it_be
             SampleKind::Average,
             SampleKind::DeltaAngle,
         ] {
-            let plan = Plan {
+            let plan = EstimationSettings {
                 kind: Some(kind),
-                ..Plan::default()
+                ..EstimationSettings::default()
             };
             let (_, expected) = attitudes(&replay_with(&fine, plan.clone()), dir.path());
             let (summary, found) = attitudes(&replay_with(&coarse, plan), dir.path());
@@ -382,7 +382,7 @@ fn no_gap_is_advised_to_be_bridged_that_is_a_clock_being_set() {
     let flags = |name: &str, stamp: fn(i64) -> i64| {
         let path = imu_log(dir.path(), name, &motion(600), stamp);
         let checked = check(
-            &logged::open(&path).unwrap(),
+            &opening::open(&path).unwrap(),
             None,
             &Default::default(),
             &pool,
@@ -456,9 +456,9 @@ fn a_nameless_sensor_has_one_name_in_its_attitude_and_its_transform() {
         let out = dir.path().join("out.mcap");
         let mut replay = replay_with(
             &path,
-            Plan {
+            EstimationSettings {
                 world,
-                ..Plan::default()
+                ..EstimationSettings::default()
             },
         );
         replay.targets = vec![target(&out)];

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use strapd::address::Address;
 use strapd::store::{patience::Patience, reach_with};
-use strapd_recording::elsewhere::Found;
+use strapd_recording::remote_object::RemoteSource;
 
 /// A log of several requests: 2 MB, of which nothing is left out.
 fn log(dir: &Path) -> String {
@@ -135,11 +135,11 @@ fn who_says_no_is_told_by_address_and_number() {
 fn all(server: &Server, patience: Patience) -> Result<usize, String> {
     let address = Address::from(server.url("log.mcap"));
     match reach_with(&address, patience).map_err(|e| e.to_string())? {
-        Found::Stream(mut stream) => {
+        RemoteSource::Stream(mut stream) => {
             let mut bytes = Vec::new();
             stream.read_to_end(&mut bytes).map_err(|e| e.to_string())
         }
-        Found::Object(object) => {
+        RemoteSource::Object(object) => {
             let mut bytes = vec![0; object.size() as usize];
             object.read_at(&mut bytes, 0).map_err(|e| e.to_string())
         }
@@ -173,7 +173,7 @@ fn bytes_are_those_of_the_object_wherever_it_is_read_and_each_is_fetched_once() 
     let object: Vec<u8> = (0..5_000_000_u32).map(|n| (n * 7 / 3) as u8).collect();
     let server = Server::of(Manner::Cut(400_000), object.clone());
     let address = Address::from(server.url("a"));
-    let Ok(Found::Object(found)) = reach_with(&address, Patience::default()) else {
+    let Ok(RemoteSource::Object(found)) = reach_with(&address, Patience::default()) else {
         panic!("it knows ranges");
     };
     assert_eq!(found.size(), object.len() as u64);

@@ -7,12 +7,12 @@ use crate::serve::client::Client;
 use crate::serve::daemon::{Daemon, TCP, WS, eventually, listening};
 use serde_json::{Value, json};
 use strapd::serve::guard::admission::Token;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 
 const SECRET: &str = "correct horse battery";
 
 /// A daemon, and who has sent it 20 s of a body that rolls; its token was shown where there is one.
-fn rolling(token: Option<&str>, plan: Plan) -> (Daemon, Client) {
+fn rolling(token: Option<&str>, plan: EstimationSettings) -> (Daemon, Client) {
     let mut settings = listening(&[TCP, WS]);
     settings.hub.plan = plan;
     settings.hub.token = token.map(Token::new);
@@ -165,7 +165,7 @@ fn a_page_of_another_origin_begins_nothing_anew() {
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn of_a_gyro_alone_nothing_more_is_shown_and_zero_is_where_it_is() {
     let mut browser = Browser::start();
-    let (daemon, mut sender) = rolling(None, Plan::default());
+    let (daemon, mut sender) = rolling(None, EstimationSettings::default());
     browser.go(daemon.address(1), "/");
     browser.until_open();
     browser.until("the button", &format!("{BUTTON} && !{BUTTON}.hidden"));

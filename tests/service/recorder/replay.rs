@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use strapd::pipeline::logged;
+use strapd::pipeline::opening;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::request::ReplayRequest;
 use strapd::serve::core::recorder::{Recorder, Settings};
@@ -23,7 +23,7 @@ use strapd_recording::recording::channel_route::{Item, Route};
 /// The samples of a fixture, decoded as `replay` decodes them.
 fn samples(path: &Path) -> Vec<RawSample> {
     let log = Recording::of(
-        &logged::open(path).unwrap(),
+        &opening::open(path).unwrap(),
         &decode::Options::default(),
         &Pool::new(1).unwrap(),
     )

@@ -5,7 +5,7 @@ use super::client::Client;
 use super::daemon::{Daemon, TCP, listening};
 use super::runs::Fed;
 use serde_json::Value;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 
 /// A body that rolls slowly to and fro about 0.3 rad at 100 Hz, its gyro off by 0.5 deg/s.
 pub(crate) fn line(n: u64) -> String {
@@ -21,10 +21,10 @@ pub(crate) fn line(n: u64) -> String {
     )
 }
 
-pub(crate) fn aided() -> Plan {
-    Plan {
+pub(crate) fn aided() -> EstimationSettings {
+    EstimationSettings {
         aid: Aid::Gravity,
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn roll(attitude: &str) -> f64 {
 
 #[test]
 fn after_a_restart_it_goes_on_to_the_bit_with_all_that_was_learned() {
-    let field = |plan: Plan| Plan {
+    let field = |plan: EstimationSettings| EstimationSettings {
         aid: Aid::GravityAndField,
         ..plan
     };
@@ -95,7 +95,7 @@ fn after_a_restart_it_goes_on_to_the_bit_with_all_that_was_learned() {
 
 #[test]
 fn what_another_plan_had_learned_leaves_it_level_at_once() {
-    let other = Plan {
+    let other = EstimationSettings {
         max_gap_secs: 0.25,
         ..aided()
     };

@@ -4,13 +4,13 @@
 use super::aiding::{aided, roll};
 use super::runs::{Fed, Got};
 use serde_json::{Value, json};
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 
 /// Plan with which `serve` begins.
-fn auto() -> Plan {
-    Plan {
+fn auto() -> EstimationSettings {
+    EstimationSettings {
         aid: Aid::Auto,
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
@@ -90,9 +90,9 @@ fn where_a_rate_comes_first_it_is_said_and_a_flag_levels() {
     assert_eq!((got.attitudes.len(), got.said.len()), (3000, 0));
     assert!(off(&got, 2999) < 0.3, "{}", off(&got, 2999));
     // Who asked for the gyro alone is told nothing.
-    let alone = Plan {
+    let alone = EstimationSettings {
         aid: Aid::None,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     assert_eq!(Fed::of(&alone).lines(lines()).said, [] as [Value; 0]);
 }
@@ -114,9 +114,9 @@ fn after_a_restart_it_goes_on_to_the_bit() {
 
 #[test]
 fn a_field_of_its_own_gives_north() {
-    let plan = Plan {
+    let plan = EstimationSettings {
         aid: Aid::GravityAndField,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     // The body's x axis points 30 degrees north of east.
     let field = |n: u64| {

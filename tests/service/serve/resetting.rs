@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpStream};
 use strapd::serve::core::hub::{Hub, Settings};
 use strapd::serve::guard::admission::Token;
-use strapd_attitude::estimate::{Bias, Initial, Plan};
+use strapd_attitude::estimate::{Bias, EstimationSettings, Initial};
 use strapd_attitude::quaternion::Quaternion;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
@@ -65,13 +65,13 @@ fn after_a_reset_a_gyro_alone_is_one_that_begins_with_that_attitude() {
             Initial::Given(Quaternion::assume_unit(q)),
         ),
     ] {
-        let mut daemon = Fed::of(&Plan::default());
+        let mut daemon = Fed::of(&EstimationSettings::default());
         daemon.lines((0..500).map(turning));
         // By who connects later, too, where nobody sends the sensor.
         let got = daemon.lines(std::iter::once(asked).chain((500..900).map(turning)));
-        let expected = Fed::of(&Plan {
+        let expected = Fed::of(&EstimationSettings {
             initial,
-            ..Plan::default()
+            ..EstimationSettings::default()
         })
         .lines((500..900).map(turning));
         assert_eq!(got.attitudes.len(), 400);
@@ -161,8 +161,8 @@ fn what_can_not_be_is_refused_with_words_counted_and_changes_nothing() {
             "bad_reset",
         ),
     ];
-    let mut daemon = Fed::of(&Plan::default());
-    let expected = Fed::of(&Plan::default()).lines((0..200).map(turning));
+    let mut daemon = Fed::of(&EstimationSettings::default());
+    let expected = Fed::of(&EstimationSettings::default()).lines((0..200).map(turning));
     let asked = refused.iter().map(|(line, _)| line.clone());
     let got = daemon.lines(
         (0..100)
@@ -439,7 +439,7 @@ fn a_replay_refuses_a_reset_with_words() {
 
 #[test]
 fn gravity_and_bias_begin_what_a_daemon_learns_and_are_refused_of_a_gyro_alone() {
-    let asked = Plan {
+    let asked = EstimationSettings {
         initial: Initial::Gravity,
         bias: Bias::Auto,
         ..aided()
@@ -457,13 +457,13 @@ fn gravity_and_bias_begin_what_a_daemon_learns_and_are_refused_of_a_gyro_alone()
     assert!((bias.to_degrees() - 0.5).abs() < 0.1, "{bias}");
     // A gyro alone has nothing to learn from: at the start where that is known, else by its first sample.
     for plan in [
-        Plan {
+        EstimationSettings {
             initial: Initial::Gravity,
-            ..Plan::default()
+            ..EstimationSettings::default()
         },
-        Plan {
+        EstimationSettings {
             bias: Bias::Auto,
-            ..Plan::default()
+            ..EstimationSettings::default()
         },
     ] {
         let why = Hub::new(Settings {
@@ -472,7 +472,7 @@ fn gravity_and_bias_begin_what_a_daemon_learns_and_are_refused_of_a_gyro_alone()
         });
         let why = why.unwrap_err().to_string();
         assert!(why.contains("aid gravity"), "{why}");
-        let mut daemon = Fed::of(&Plan {
+        let mut daemon = Fed::of(&EstimationSettings {
             aid: strapd_attitude::estimate::Aid::Auto,
             ..plan
         });

@@ -12,7 +12,7 @@ use strapd::serve::core::hub::{Hub, Settings};
 use strapd::serve::core::session::{Scratch, Session};
 use strapd::serve::core::state::{Saved, Sensors};
 use strapd_attitude::estimate::Memory;
-use strapd_attitude::estimate::{Plan, settings};
+use strapd_attitude::estimate::{EstimationSettings, settings};
 use strapd_attitude::record::{Nanos, SampleKind};
 
 /// Number `n` of a lively motion at 200 Hz, in words of its own: jittered by up to 0.4 ms, one in 97 lost.
@@ -78,7 +78,7 @@ impl Fed {
         }
     }
 
-    pub(crate) fn of(plan: &Plan) -> Fed {
+    pub(crate) fn of(plan: &EstimationSettings) -> Fed {
         Fed::new(Settings {
             plan: plan.clone(),
             ..Settings::default()
@@ -86,7 +86,7 @@ impl Fed {
     }
 
     /// Another daemon, after this one was ended: between the two there is text.
-    pub(crate) fn restarted(self, plan: &Plan) -> Fed {
+    pub(crate) fn restarted(self, plan: &EstimationSettings) -> Fed {
         let text = serde_json::to_string(&self.hub.saved()).unwrap();
         Fed::new(Settings {
             plan: plan.clone(),
@@ -173,7 +173,7 @@ fn the_same_stream_sent_twice_is_two_runs_and_the_second_is_said() {
 
 #[test]
 fn samples_sent_again_after_a_lost_connection_are_late_and_turn_nothing() {
-    let plan = Plan::default();
+    let plan = EstimationSettings::default();
     let expected = Fed::of(&plan).send(0..1500);
     let mut daemon = Fed::of(&plan);
     let mut got = daemon.send(0..800).attitudes;
@@ -205,21 +205,21 @@ fn who_begins_further_back_than_the_window_begins_a_run() {
     assert_eq!(daemon.send(301..305).codes("NOTE"), ["new_run"]);
 }
 
-fn put(plan: &mut Plan, setting: &str, text: &str) {
+fn put(plan: &mut EstimationSettings, setting: &str, text: &str) {
     let row = settings::row(setting).unwrap();
     row.apply(plan, &settings::Value::Text(text)).unwrap();
 }
 
 /// Plans by which a sensor may be understood.
-fn plans() -> Vec<(&'static str, Plan)> {
-    let of = |change: &dyn Fn(&mut Plan)| {
-        let mut plan = Plan::default();
+fn plans() -> Vec<(&'static str, EstimationSettings)> {
+    let of = |change: &dyn Fn(&mut EstimationSettings)| {
+        let mut plan = EstimationSettings::default();
         change(&mut plan);
         plan
     };
     let method = |text: &str| of(&|p| put(p, "method", text));
     vec![
-        ("as it is", Plan::default()),
+        ("as it is", EstimationSettings::default()),
         ("averages", of(&|p| p.kind = Some(SampleKind::Average))),
         (
             "delta angles",
@@ -281,7 +281,7 @@ fn a_restart_in_a_stream_that_goes_on_changes_no_byte_of_it() {
 
 #[test]
 fn after_a_restart_a_short_gap_is_bridged_a_long_one_held_and_both_say_so() {
-    let plan = Plan::default();
+    let plan = EstimationSettings::default();
     let mut daemon = Fed::of(&plan);
     let before = daemon.send(0..400);
     let mut daemon = daemon.restarted(&plan);
@@ -337,12 +337,12 @@ fn after_a_restart_a_short_gap_is_bridged_a_long_one_held_and_both_say_so() {
 
 #[test]
 fn other_settings_after_a_restart_hold_the_attitude() {
-    let plan = Plan::default();
+    let plan = EstimationSettings::default();
     let mut daemon = Fed::of(&plan);
     daemon.send(0..400);
-    let other = Plan {
+    let other = EstimationSettings {
         gyro_range: Some(20.0),
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     let first = daemon.restarted(&other).send(400..401).first();
     assert_eq!(first["status"].to_string(), r#"["held","restarted"]"#);
@@ -441,7 +441,7 @@ fn paths(value: &Value, at: String, out: &mut Vec<String>) {
 
 #[test]
 fn what_is_saved_is_text_that_can_be_read() {
-    let mut daemon = Fed::of(&Plan::default());
+    let mut daemon = Fed::of(&EstimationSettings::default());
     daemon.send(0..100);
     let saved: Saved = daemon.hub.saved().remove("imu0").unwrap();
     let value = serde_json::to_value(&saved).unwrap();

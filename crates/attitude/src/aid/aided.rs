@@ -1,7 +1,7 @@
 //! Propagator and filter together: corrected rates in, corrected attitudes out. Pure.
 
-use super::beside::Beside;
-use super::calibration::Applied;
+use super::beside::VectorPairing;
+use super::calibration::CorrectionMatrices;
 use super::filter::{Filter, Innovation, Measured};
 use super::settings::Settings;
 use crate::frames::{Body, In, Nav};
@@ -65,7 +65,7 @@ pub enum Start {
 /// # Ok::<(), strapd_attitude::propagate::SettingsError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Aided {
+pub struct AidedPropagator {
     pub(super) propagator: Propagator,
     pub(super) filter: Filter,
     start: Start,
@@ -82,7 +82,7 @@ pub struct Aided {
     innovations: Option<Vec<(Nanos, Innovation)>>,
 }
 
-/// State of an [`Aided`] beside those of its propagator and its filter: what is on its way between them.
+/// State of an [`AidedPropagator`] beside those of its propagator and its filter: what is on its way between them.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StreamState {
@@ -92,8 +92,8 @@ pub(super) struct StreamState {
     /// The last attitude, w, x, y, z.
     pub(super) last_out: Option<[f64; 4]>,
     /// Specific forces that do not come with the gyro samples.
-    pub(super) forces: Option<Beside>,
-    pub(super) fields: Beside,
+    pub(super) forces: Option<VectorPairing>,
+    pub(super) fields: VectorPairing,
 }
 
 /// A sample and what it was corrected by.
@@ -102,11 +102,11 @@ pub(super) struct StreamState {
 pub(super) struct Given {
     stamp: Nanos,
     measured: Measured,
-    applied: Applied,
+    applied: CorrectionMatrices,
     join: Join,
 }
 
-impl Aided {
+impl AidedPropagator {
     /// Ready for the first sample.
     ///
     /// # Errors
@@ -115,7 +115,7 @@ impl Aided {
         propagation: propagate::Settings,
         settings: Settings,
         start: Start,
-    ) -> Result<Aided, SettingsError> {
+    ) -> Result<AidedPropagator, SettingsError> {
         let is_instant = propagation.kind == SampleKind::Rate;
         let _ = propagation.checked()?;
         // The filter says how well the attitude is known.
@@ -123,7 +123,7 @@ impl Aided {
             noise: propagate::Noise::default(),
             ..propagation
         })?;
-        Ok(Aided {
+        Ok(AidedPropagator {
             filter: Filter::new(settings, is_instant, propagation.world_rate),
             propagator,
             start,
@@ -135,7 +135,7 @@ impl Aided {
                 last: None,
                 last_out: None,
                 forces: None,
-                fields: Beside::with_repeats(),
+                fields: VectorPairing::with_repeats(),
             },
             corrected: Vec::new(),
             scratch: Vec::new(),
@@ -143,14 +143,14 @@ impl Aided {
         })
     }
 
-    /// The same where specific forces come by [`Aided::take_force`], and not with the gyro samples.
+    /// The same where specific forces come by [`AidedPropagator::take_force`], and not with the gyro samples.
     #[must_use]
-    pub fn with_forces_beside(mut self) -> Aided {
+    pub fn with_forces_beside(mut self) -> AidedPropagator {
         self.expect_forces_beside();
         self
     }
 
-    /// Keeps the innovations of every correction from now on, for [`Aided::innovations`].
+    /// Keeps the innovations of every correction from now on, for [`AidedPropagator::innovations`].
     pub fn keep_innovations(&mut self) {
         self.innovations.get_or_insert_default();
     }
@@ -168,7 +168,7 @@ impl Aided {
         self.stream.forces.is_some()
     }
 
-    /// Expects forces on a topic of their own from now on, as after [`Aided::with_forces_beside`].
+    /// Expects forces on a topic of their own from now on, as after [`AidedPropagator::with_forces_beside`].
     pub fn expect_forces_beside(&mut self) {
         self.stream.forces.get_or_insert_default();
     }
@@ -215,8 +215,8 @@ impl Aided {
     }
 
     /// See [`Propagator::succeed`].
-    pub fn succeed(&mut self, resets: u32) {
-        self.propagator.succeed(resets);
+    pub fn continue_counts_of(&mut self, resets: u32) {
+        self.propagator.continue_counts_of(resets);
     }
 
     /// The next sample that says [`Join::Reset`] begins with this attitude, of which `start` is known; what was

@@ -18,7 +18,7 @@ const MOST: usize = 4096;
 /// Vectors on their way to gyro samples.
 #[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Beside {
+pub(crate) struct VectorPairing {
     waiting: VecDeque<(Nanos, Vector3<f64>)>,
     last: Option<Vector3<f64>>,
     /// Whether one that equals the one before it is that one again.
@@ -30,12 +30,12 @@ pub(crate) struct Beside {
     pub(super) not_finite: u64,
 }
 
-impl Beside {
+impl VectorPairing {
     /// Makes it for a sensor whose messages may state the same measurement several times.
-    pub(crate) fn with_repeats() -> Beside {
-        Beside {
+    pub(crate) fn with_repeats() -> VectorPairing {
+        VectorPairing {
             has_repeats: true,
-            ..Beside::default()
+            ..VectorPairing::default()
         }
     }
 
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_vector_waits_for_the_gyro_sample_at_or_after_it_and_is_turned_there() {
-        let mut beside = Beside::default();
+        let mut beside = VectorPairing::default();
         beside.take(Nanos(10_000_000), X);
         let rate = Vector3::new(0.0, 0.0, 2.0);
         assert_eq!(beside.at(Nanos(9_000_000), &rate), None);
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn what_is_half_a_second_off_belongs_to_no_sample_and_blocks_none() {
-        let mut beside = Beside::default();
+        let mut beside = VectorPairing::default();
         let still = Vector3::zeros();
         beside.take(Nanos(0), X);
         beside.take(Nanos(9_000_000_000), X);
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_measurement_said_again_is_none_and_those_that_nobody_takes_are_bounded() {
-        let mut beside = Beside::with_repeats();
+        let mut beside = VectorPairing::with_repeats();
         for i in 0..3 {
             beside.take(Nanos(i), X);
         }

@@ -50,14 +50,14 @@ impl Calibration {
 /// Part of a calibration by which a rate is corrected.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Applied {
+pub(crate) struct CorrectionMatrices {
     pub(super) bias: Vector3<f64>,
     pub(super) matrix: Matrix3<f64>,
 }
 
-impl Applied {
-    pub(crate) fn of(calibration: &Calibration) -> Applied {
-        Applied {
+impl CorrectionMatrices {
+    pub(crate) fn of(calibration: &Calibration) -> CorrectionMatrices {
+        CorrectionMatrices {
             bias: calibration.bias,
             matrix: calibration.matrix(),
         }

@@ -1,7 +1,7 @@
 //! The filter: what it holds, what a sample adds, what a gap leaves unknown. Pure.
 
-use super::beside::Beside;
-use super::calibration::{Applied, Calibration};
+use super::beside::VectorPairing;
+use super::calibration::{Calibration, CorrectionMatrices};
 use super::covariance::{BIAS, CROSS, FORCE_BIAS, IRON, LEAD, SCALE, TILT};
 use super::interval::Interval;
 use super::settings::Settings;
@@ -100,7 +100,7 @@ pub struct Filter {
 #[derive(Clone, Debug)]
 pub(super) struct Derived {
     /// The calibration, as rates are corrected by it.
-    pub(super) known: Applied,
+    pub(super) known: CorrectionMatrices,
     /// Whether it was levelled since the sample before.
     pub(super) has_levelled: bool,
     /// Innovation of the last correction.
@@ -118,7 +118,7 @@ impl Filter {
             world_rate: *world_rate.as_vector(),
             state: State::default(),
             derived: Derived {
-                known: Applied::of(&Calibration::default()),
+                known: CorrectionMatrices::of(&Calibration::default()),
                 has_levelled: false,
                 innovation: Innovation::NONE,
             },
@@ -234,7 +234,7 @@ impl Filter {
     }
 
     /// Calibration by which the rates that come now are to be corrected.
-    pub(crate) fn applied(&self) -> Applied {
+    pub(crate) fn applied(&self) -> CorrectionMatrices {
         self.derived.known
     }
 
@@ -274,7 +274,7 @@ impl Filter {
     }
 
     /// Counts vectors that were measured on topics of their own.
-    pub(super) fn count_beside(&mut self, forces: Option<&Beside>, fields: &Beside) {
+    pub(super) fn count_beside(&mut self, forces: Option<&VectorPairing>, fields: &VectorPairing) {
         self.state.report.fields = fields.paired;
         self.state.report.fields_unpaired = fields.unpaired + fields.not_finite;
         self.state.report.forces_unpaired =
@@ -340,7 +340,12 @@ impl Filter {
 
     /// Takes the next sample after it has begun, whose rate the propagator was given corrected by `known`. `r` is the
     /// matrix of its attitude, corrected, at the sample's instant. Whether that has been corrected further.
-    pub(crate) fn take(&mut self, sample: &Measured, known: &Applied, r: &Matrix3<f64>) -> bool {
+    pub(crate) fn take(
+        &mut self,
+        sample: &Measured,
+        known: &CorrectionMatrices,
+        r: &Matrix3<f64>,
+    ) -> bool {
         let secs = sample.secs;
         self.derived.has_levelled = false;
         let is_gap =

@@ -1,6 +1,6 @@
 //! Samples since the last correction -> sums. Pure.
 
-use super::calibration::Applied;
+use super::calibration::CorrectionMatrices;
 use crate::plausible::{are_numbers, is_amount};
 use nalgebra::{Matrix3, Vector3};
 
@@ -63,7 +63,7 @@ impl Interval {
         secs: f64,
         r: &Matrix3<f64>,
         rate: &Vector3<f64>,
-        known: &Applied,
+        known: &CorrectionMatrices,
     ) {
         let left = rate - known.bias;
         for (i, scaled) in self.scaled.iter_mut().enumerate() {

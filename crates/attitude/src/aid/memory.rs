@@ -2,9 +2,9 @@
 //!
 //! Apart from the filter because it is read by another process: nothing in it is believed unseen.
 
-use super::aided::{Aided, StreamState};
-use super::beside::Beside;
-use super::calibration::Applied;
+use super::aided::{AidedPropagator, StreamState};
+use super::beside::VectorPairing;
+use super::calibration::CorrectionMatrices;
 use super::state::State;
 use crate::plausible::{are_numbers, is_amount, is_unit};
 use crate::propagate;
@@ -17,7 +17,7 @@ const SCALE: f64 = 0.5;
 const FORCE_BIAS: f64 = 100.0;
 const LEAD: f64 = 1.0;
 
-/// State of an [`Aided`] at one moment; [`Aided::recall`] restores it. Of a method without latency
+/// State of an [`AidedPropagator`] at one moment; [`AidedPropagator::recall`] restores it. Of a method without latency
 /// some 8 kB of text, 4 more at rest.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(
@@ -32,7 +32,7 @@ pub struct Memory {
     stream: StreamState,
 }
 
-impl Aided {
+impl AidedPropagator {
     /// States of it and of its propagator; `None` before the first sample of a run.
     #[must_use]
     pub fn memory(&self) -> Option<(propagate::Memory, Memory)> {
@@ -54,7 +54,7 @@ impl Aided {
             return false;
         }
         self.filter.state = memory.filter.clone();
-        self.filter.derived.known = Applied::of(&memory.filter.calibration);
+        self.filter.derived.known = CorrectionMatrices::of(&memory.filter.calibration);
         self.stream = memory.stream.clone();
         self.is_resumed = false;
         true
@@ -100,7 +100,7 @@ impl Memory {
             && stream.given.len() <= MOST_GIVEN
             && filter.rest.is_bounded()
             && filter.vertical.is_plausible()
-            && beside.all(Beside::is_bounded)
+            && beside.all(VectorPairing::is_bounded)
     }
 }
 
@@ -109,6 +109,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::aid::covariance::Covariance;
+    #[cfg(feature = "serde")]
     use crate::aid::vertical::Vertical;
     use crate::aid::{Settings, Start};
     use crate::frames::In;
@@ -144,11 +145,11 @@ mod tests {
         }
     }
 
-    fn aided(method: Method) -> Aided {
+    fn aided(method: Method) -> AidedPropagator {
         aided_with(method, 0.0)
     }
 
-    fn aided_with(method: Method, hard_iron: f64) -> Aided {
+    fn aided_with(method: Method, hard_iron: f64) -> AidedPropagator {
         let propagation = propagate::Settings {
             method,
             ..propagate::Settings::default()
@@ -158,10 +159,10 @@ mod tests {
             hard_iron,
             ..Settings::default()
         };
-        Aided::new(propagation, settings, Start::Level).unwrap()
+        AidedPropagator::new(propagation, settings, Start::Level).unwrap()
     }
 
-    fn fed(aided: &mut Aided, samples: std::ops::Range<i64>) -> Vec<AttitudeSample> {
+    fn fed(aided: &mut AidedPropagator, samples: std::ops::Range<i64>) -> Vec<AttitudeSample> {
         let mut out = Vec::new();
         for i in samples {
             if i % 7 == 0 {
@@ -291,7 +292,7 @@ mod tests {
             |m| m.filter.velocity[1] = f64::NAN,
             |m| m.filter.nominal = -1.0,
             |m| m.filter.vertical.take(&Vector3::z(), -50.0, 0.05),
-            |m| m.stream.forces = Some(Beside::default()),
+            |m| m.stream.forces = Some(VectorPairing::default()),
         ];
         for (n, spoil) in spoil.into_iter().enumerate() {
             let mut bad = good.clone();

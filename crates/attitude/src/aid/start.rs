@@ -1,6 +1,6 @@
 //! Start of the filter, and its restart. Pure.
 
-use super::calibration::Applied;
+use super::calibration::CorrectionMatrices;
 use super::covariance::{BIAS, FIELD, HEADING, POSITION, TILT, VELOCITY};
 use super::filter::{Filter, Measured, is_field};
 use super::interval::Interval;
@@ -144,7 +144,7 @@ impl Filter {
     pub(super) fn forget_calibration(&mut self) {
         let settings = self.settings;
         (self.state.calibration, self.state.covariance) = settings.prior.begin(&settings);
-        self.derived.known = Applied::of(&self.state.calibration);
+        self.derived.known = CorrectionMatrices::of(&self.state.calibration);
         self.state.is_widened = false;
         self.state.vertical = Vertical::default();
     }

@@ -1,6 +1,6 @@
 //! Update every tenth of a second: covariance on, measurements, correction. Pure.
 
-use super::calibration::Applied;
+use super::calibration::CorrectionMatrices;
 use super::covariance::{
     BIAS, CROSS, Correction, FIELD, FORCE_BIAS, HEADING, IRON, LEAD, POSITION, SCALE, TILT,
     Transition, VELOCITY, WIDTH,
@@ -194,7 +194,7 @@ impl Filter {
         calibration.lead += correction[LEAD];
         calibration.hard_iron += three(IRON);
         self.state.disturbance += correction[FIELD];
-        self.derived.known = Applied::of(calibration);
+        self.derived.known = CorrectionMatrices::of(calibration);
         // The earth axes of the estimate have turned.
         let (sin, cos) = correction[HEADING].sin_cos();
         self.state.covariance.turn(cos, sin);

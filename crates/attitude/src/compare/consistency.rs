@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 
 /// An attitude with what is known of its error.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Known {
+pub struct UncertainAttitude {
     /// Stamp.
     pub stamp: Nanos,
     /// The estimate.
@@ -90,13 +90,13 @@ const EXPLAINED: f64 = 0.5;
 /// and leaves the reference's tilt by a constant is judged by what is left without it: `leaning` says so.
 #[must_use]
 pub fn consistency<'r>(
-    estimate: &[Known],
+    estimate: &[UncertainAttitude],
     reference: impl Into<Reference<'r>>,
     align: Align,
     mut visit: impl FnMut(&BoundedError),
 ) -> Option<Consistency> {
     let reference: Reference<'_> = reference.into();
-    let mut rows: Vec<&Known> = estimate
+    let mut rows: Vec<&UncertainAttitude> = estimate
         .iter()
         .filter(|known| {
             Quaternion::<Nav, Body>::try_from_wxyz(known.q_nb.wxyz()).is_ok()
@@ -287,12 +287,12 @@ mod tests {
     }
 
     /// Off by `error(share of the time)`, rad in the world's axes, and said to be by `sigma` about each body axis.
-    fn estimate(error: impl Fn(f64) -> Vector3<f64>, sigma: f64) -> Vec<Known> {
+    fn estimate(error: impl Fn(f64) -> Vector3<f64>, sigma: f64) -> Vec<UncertainAttitude> {
         (0..ROWS)
             .map(|i| {
                 let error = RotationVector(error(i as f64 / ROWS as f64));
                 let turn: Quaternion<Nav, Nav> = Quaternion::from_rotation_vector(&error);
-                Known {
+                UncertainAttitude {
                     stamp: Nanos(i * 10_000_000),
                     q_nb: (turn * truth(i)).normalised(),
                     covariance: AttitudeCovariance::from_sigma(Vector3::from_element(sigma)),
@@ -301,7 +301,7 @@ mod tests {
             .collect()
     }
 
-    fn judged(known: &[Known], align: Align) -> Consistency {
+    fn judged(known: &[UncertainAttitude], align: Align) -> Consistency {
         consistency(known, &reference(), align, |_| {}).unwrap()
     }
 

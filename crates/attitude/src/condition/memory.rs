@@ -127,7 +127,7 @@ impl Conditioner {
     }
 
     /// Begins as the run after one of which so much was counted.
-    pub fn succeed(&mut self, counted: &Report) {
+    pub fn continue_counts_of(&mut self, counted: &Report) {
         self.report = counted.clone();
         self.report.first = None;
         self.report.last = None;

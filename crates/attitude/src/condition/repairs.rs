@@ -1,4 +1,4 @@
-//! What a person lets be repaired in samples that are wrong: stamps, and single rates. Pure.
+//! Policies of repair: whether wrong stamps, and wrong single rates, are mended. Pure.
 //!
 //! A file of its own because the settings and the stages that repair stand on it.
 

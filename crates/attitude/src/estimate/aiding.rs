@@ -4,7 +4,7 @@
 //! specific force (phones export acceleration without gravity) would level to anything.
 
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, Initial, NOISE_PRESETS, Noise, Plan};
+use super::plan::{Aid, EstimationSettings, Initial, NOISE_PRESETS, Noise};
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
@@ -83,7 +83,7 @@ impl Aiding {
     /// # Errors
     /// In words: no specific force, or none that can be. With [`Aid::Auto`] that is a warning.
     pub fn decide(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         first: &[RawSample],
         warnings: &mut Vec<Diagnostic>,
@@ -168,7 +168,7 @@ impl Aiding {
     }
 
     fn by_force(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         first: &[RawSample],
         warnings: &mut Vec<Diagnostic>,
@@ -227,7 +227,7 @@ impl Aiding {
     }
 
     /// The same for a sensor of the class of `plan`.
-    pub(super) fn of_class(self, plan: &Plan, resolved: &Meaning) -> Aiding {
+    pub(super) fn of_class(self, plan: &EstimationSettings, resolved: &Meaning) -> Aiding {
         let mut settings = Aiding::with_scale((plan, resolved), self.force_scale).settings;
         if plan.bias.left().is_some() {
             settings.bias_prior = self.settings.bias_prior;
@@ -235,7 +235,7 @@ impl Aiding {
         Aiding { settings, ..self }
     }
 
-    fn with_scale((plan, resolved): (&Plan, &Meaning), force_scale: f64) -> Aiding {
+    fn with_scale((plan, resolved): (&EstimationSettings, &Meaning), force_scale: f64) -> Aiding {
         let mut settings = Settings {
             gyro_range: plan.gyro_range.unwrap_or(0.0),
             has_field: plan.aid == Aid::GravityAndField,
@@ -428,9 +428,9 @@ mod tests {
                 }
             })
             .collect();
-        let plan = Plan {
+        let plan = EstimationSettings {
             aid: Aid::Gravity,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         let meaning = Meaning::new(&plan, &Declared::default());
         let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);
@@ -497,7 +497,7 @@ mod tests {
             misalignment: 0.0,
             tilt: 0.0,
             delay: 0.0,
-            ..Plan::default().noise
+            ..EstimationSettings::default().noise
         };
         let mut settings = Settings::default();
         of_class(&mut settings, &silent);

@@ -5,7 +5,7 @@
 
 use super::aiding;
 use super::meaning::Meaning;
-use super::plan::{Initial, Plan};
+use super::plan::{EstimationSettings, Initial};
 use super::preparation::{Prepared, decide_initial, learned_on_the_way};
 use crate::aid::Start;
 use crate::condition::stillness::Rests;
@@ -17,7 +17,7 @@ use crate::setting::AID;
 
 /// Attitude with which a stream that goes on begins again.
 #[derive(Clone, Debug)]
-pub struct Anew {
+pub struct RestartRequest {
     /// q_nb at the next sample, ENU (or start) and FLU.
     pub attitude: Quaternion<Nav, Body>,
     /// Knowledge of it.
@@ -26,19 +26,19 @@ pub struct Anew {
     pub origin: String,
 }
 
-impl Anew {
+impl RestartRequest {
     /// The attitude `initial` at the sample `next` of a stream that was understood as `resolved` and begun as
     /// `prepared`, live: gravity is the next specific force.
     ///
     /// # Errors
     /// In words: nothing levels the attitude, or the sample carries no orientation.
     pub fn at(
-        plan: &Plan,
+        plan: &EstimationSettings,
         initial: Initial,
         resolved: &Meaning,
         prepared: &Prepared,
         next: &RawSample,
-    ) -> Result<Anew, Diagnostic> {
+    ) -> Result<RestartRequest, Diagnostic> {
         let aiding = prepared.aiding.as_ref();
         if initial == Initial::Gravity && aiding.is_none() {
             return Err(
@@ -50,7 +50,7 @@ impl Anew {
                 )
             );
         }
-        let plan = learned_on_the_way(&Plan {
+        let plan = learned_on_the_way(&EstimationSettings {
             initial,
             ..plan.clone()
         });
@@ -62,7 +62,7 @@ impl Anew {
             &mut Vec::new(),
         )?;
         let has_field = aiding.is_some_and(|aiding| aiding.settings.has_field);
-        Ok(Anew {
+        Ok(RestartRequest {
             attitude,
             start: aiding::start(plan.initial, has_field),
             origin,

@@ -4,12 +4,12 @@
 //! out of a sample, while the filter knows body axes and what is left.
 
 use super::meaning::Meaning;
-use super::plan::{Noise, Plan};
+use super::plan::{EstimationSettings, Noise};
 use super::preparation::Prepared;
-use super::sensor_calibration::{Known, SensorCalibration};
+use super::sensor_calibration::{CalibrationTerm, SensorCalibration};
 use super::smoothing::Recording;
 use crate::aid::{Filter, Prior, Settings};
-use crate::smooth::{Beforehand, Learned, OBSERVED, Smoothed};
+use crate::smooth::{Estimated, OBSERVED, PriorSigmas, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// Change of a chip's bias while it is switched off, rad/s (0.3 deg/s): ten degrees of temperature do that. A
@@ -53,12 +53,12 @@ fn diagonal(sigma: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Sigmas of three numbers, by `class` where data have not told them.
-fn sigmas(known: &Known<3>, class: f64) -> Vector3<f64> {
+fn sigmas(known: &CalibrationTerm<3>, class: f64) -> Vector3<f64> {
     Vector3::from_fn(|i, _| known.sigma_of(i).unwrap_or(class))
 }
 
 /// Sigmas of scale and axes of a matrix that need not be symmetric, by `settings` where data have not told them.
-fn scale_sigmas(gyro: Option<&Known<9>>, settings: &Settings) -> [f64; 6] {
+fn scale_sigmas(gyro: Option<&CalibrationTerm<9>>, settings: &Settings) -> [f64; 6] {
     PAIRS.map(|(i, j)| {
         let class = if i == j {
             settings.scale_prior
@@ -81,7 +81,7 @@ impl Meaning {
             return Prior::default();
         };
         let c = self.to_body();
-        let told = |known: &Option<Known<3>>| known.filter(|k| !k.is_unobserved());
+        let told = |known: &Option<CalibrationTerm<3>>| known.filter(|k| !k.is_unobserved());
         let by_gyro = c * calibration.gyro_matrix();
         let by_force = c * calibration.force_matrix();
         let by_field = self.field_to_body() * calibration.field_matrix();
@@ -114,22 +114,22 @@ impl Meaning {
 
     /// Prior for a smoother: one standard deviation of each number in body axes, where all are known that it
     /// is made of there. Hard iron is not among them: a smoother knows it to a microtesla, whatever was taken out.
-    pub(super) fn beforehand(&self) -> Beforehand {
+    pub(super) fn beforehand(&self) -> PriorSigmas {
         let Some(calibration) = &self.calibration else {
-            return Beforehand::default();
+            return PriorSigmas::default();
         };
         let c = self.to_body();
-        let matrix = |c: &Matrix3<f64>, known: &Option<Known<9>>| {
+        let matrix = |c: &Matrix3<f64>, known: &Option<CalibrationTerm<9>>| {
             std::array::from_fn(|n| {
                 let known = known.as_ref()?;
                 about((0..9).map(|m| (c[(n / 3, m / 3)] * c[(n % 3, m % 3)], known.sigma_of(m))))
             })
         };
-        let time = |known: &Option<Known<1>>| {
+        let time = |known: &Option<CalibrationTerm<1>>| {
             let known = known.as_ref()?;
             Some((known.value[0], known.sigma_of(0)?))
         };
-        Beforehand {
+        PriorSigmas {
             // By the filter's settings, which have what flags say of it, too.
             gyro_bias: [None; 3],
             gyro: matrix(&c, &calibration.gyro),
@@ -168,7 +168,7 @@ impl Meaning {
 /// Of a `recording` that was smoothed, that says more than the filter that ran along.
 #[must_use]
 pub fn learned(
-    (plan, resolved, prepared): (&Plan, &Meaning, &Prepared),
+    (plan, resolved, prepared): (&EstimationSettings, &Meaning, &Prepared),
     filter: Option<&Filter>,
     recording: Option<&Recording>,
 ) -> SensorCalibration {
@@ -184,14 +184,14 @@ pub fn learned(
         SWITCHED_OFF
     };
     if let Some(left) = prepared.bias_left {
-        known.bias = Some(Known {
+        known.bias = Some(CalibrationTerm {
             value: (from_gyro * prepared.bias.0).into(),
             sigma: Some([left.hypot(switched_off); 3]),
             observed: [true; 3],
         });
     }
     if let Some(step) = prepared.truncation_step {
-        known.truncation_step = Some(Known {
+        known.truncation_step = Some(CalibrationTerm {
             value: [step],
             sigma: None,
             observed: [true],
@@ -290,7 +290,7 @@ fn by_smoother(
         squares.map(f64::sqrt).into()
     };
     // (I + E), found of what was left of a matrix that was known, in the sensor's own axes.
-    let whole = |c: &Matrix3<f64>, before: &Matrix3<f64>, found: &Learned<9>| {
+    let whole = |c: &Matrix3<f64>, before: &Matrix3<f64>, found: &Estimated<9>| {
         let left = c.transpose() * Matrix3::from_row_slice(&found.value) * c;
         let total = (Matrix3::identity() + left) * before - Matrix3::identity();
         let square = c.component_mul(c);
@@ -379,20 +379,20 @@ fn row_by_row(matrix: &Matrix3<f64>) -> [f64; 9] {
     std::array::from_fn(|n| matrix[(n / 3, n % 3)])
 }
 
-fn vector_of(known: Option<&Known<3>>) -> [f64; 3] {
+fn vector_of(known: Option<&CalibrationTerm<3>>) -> [f64; 3] {
     known.map_or([0.0; 3], |known| known.value)
 }
 
 /// Each number as it is known now, where that is better than before, else as it was: by `class` where nothing was
 /// known. `lost` is what switching the sensor off leaves unknown.
 fn now_known<const N: usize>(
-    before: Option<&Known<N>>,
+    before: Option<&CalibrationTerm<N>>,
     class: [f64; N],
     value: [f64; N],
     sigma: [f64; N],
     lost: f64,
-) -> Known<N> {
-    let mut known = before.copied().unwrap_or(Known {
+) -> CalibrationTerm<N> {
+    let mut known = before.copied().unwrap_or(CalibrationTerm {
         value: [0.0; N],
         sigma: None,
         observed: [false; N],

@@ -6,8 +6,8 @@
 use super::aiding::Aiding;
 use super::first_pass::MANY;
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, NOISE_PRESETS, Noise, NoisePreset, Plan};
-use crate::aid::{Aided, Calibration, Settings};
+use super::plan::{Aid, EstimationSettings, NOISE_PRESETS, Noise, NoisePreset};
+use crate::aid::{AidedPropagator, Calibration, Settings};
 use crate::condition::{self, Clock, Conditioner};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
@@ -37,7 +37,7 @@ const UNCALIBRATED: f64 = 0.2;
 
 /// A sample, as far as it is kept.
 #[derive(Clone, Copy, Debug)]
-struct Kept {
+struct StoredSample {
     header: Option<Nanos>,
     log: Nanos,
     gyro: Option<[f64; 3]>,
@@ -48,7 +48,7 @@ struct Kept {
 /// Decisions of the run, but for the class.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run<'a> {
-    pub(super) plan: &'a Plan,
+    pub(super) plan: &'a EstimationSettings,
     pub(super) resolved: &'a Meaning,
     pub(super) clock: Clock,
     pub(super) bias: BodyRate,
@@ -60,7 +60,7 @@ pub(super) struct Run<'a> {
 
 /// Samples kept until they can be weighed.
 #[derive(Debug, Default)]
-pub(super) struct ClassPass(Vec<Kept>);
+pub(super) struct ClassPass(Vec<StoredSample>);
 
 /// Evidence that a sensor is one that nobody calibrated.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -74,7 +74,7 @@ struct Evidence {
 
 impl ClassPass {
     /// Makes one where the class is to be found.
-    pub(super) fn of(plan: &Plan) -> Option<ClassPass> {
+    pub(super) fn of(plan: &EstimationSettings) -> Option<ClassPass> {
         // A smoother widens its priors by itself: in six hands its errors are the same, class stated or not.
         let is_open = plan.noise.is_by_data() && plan.calibration.is_none() && !plan.smooth;
         (is_open && plan.aid != Aid::None).then(ClassPass::default)
@@ -83,7 +83,7 @@ impl ClassPass {
     /// Takes the next sample.
     pub(super) fn take(&mut self, raw: &RawSample) {
         if self.wants_more() {
-            self.0.push(Kept {
+            self.0.push(StoredSample {
                 header: raw.header,
                 log: raw.log,
                 gyro: raw.gyro,
@@ -101,7 +101,7 @@ impl ClassPass {
     /// The class `uncalibrated`, what corrects the attitude with its priors, and why it is taken, where that is clear.
     pub(super) fn told(self, run: &Run<'_>) -> Option<(Noise, Aiding, Diagnostic)> {
         let noise = Noise::preset(WIDE);
-        let plan = Plan {
+        let plan = EstimationSettings {
             noise: noise.clone(),
             ..run.plan.clone()
         };
@@ -132,7 +132,7 @@ impl ClassPass {
             hard_iron: 0.0,
             ..wide.settings
         };
-        let mut aided = Aided::new(propagation, settings, wide.start).ok()?;
+        let mut aided = AidedPropagator::new(propagation, settings, wide.start).ok()?;
         let (mut rests, mut rates, mut attitudes) = (Rests::default(), Vec::new(), Vec::new());
         for kept in &self.0 {
             conditioner.push(std::slice::from_ref(&kept.raw()), &mut rates);
@@ -156,7 +156,7 @@ impl ClassPass {
     }
 }
 
-impl Kept {
+impl StoredSample {
     fn raw(&self) -> RawSample {
         RawSample {
             header: self.header,
@@ -264,15 +264,15 @@ mod tests {
     /// A body that rests for 5 s and is then turned every way for 35, with a gyro whose scale is off by `scale` and an
     /// accelerometer that is off by `force`.
     fn prepared(noise: Noise, scale: f64, force: Vector3<f64>) -> Prepared {
-        let plan = Plan {
+        let plan = EstimationSettings {
             aid: Aid::Gravity,
             noise,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         prepared_by(&plan, scale, force)
     }
 
-    fn prepared_by(plan: &Plan, scale: f64, force: Vector3<f64>) -> Prepared {
+    fn prepared_by(plan: &EstimationSettings, scale: f64, force: Vector3<f64>) -> Prepared {
         let meaning = Meaning::new(plan, &Declared::default());
         let mut preparation = Preparation::new(plan, &meaning, Patience::WholeLog);
         let mut attitude = Quaternion::<Nav, Body>::identity();
@@ -341,10 +341,10 @@ mod tests {
             off_at_rest: None,
         };
         assert!(found(0.59).is_within(&wide) && !found(0.66).is_within(&wide));
-        let plan = Plan {
+        let plan = EstimationSettings {
             aid: Aid::Gravity,
             smooth: true,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         let found = prepared_by(&plan, 0.015, Vector3::new(0.2, -0.15, 0.1));
         assert_eq!(found.noise.name, NOISE_PRESETS[0].name);

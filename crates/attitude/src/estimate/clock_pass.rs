@@ -3,7 +3,7 @@
 //! Apart from the preparation because it is one of its passes, and what `check` looks with: at stamps, arrivals and rates
 //! as they were recorded.
 
-use super::plan::Plan;
+use super::plan::EstimationSettings;
 use crate::condition::{
     BatchRate, Batches, Clock, ClockSpeed, SpeedPass, SpeedVerdict, StampRepair, batches,
 };
@@ -34,7 +34,7 @@ pub struct ClockVerdict {
 impl ClockPass {
     /// Makes one; `None` where the plan leaves stamps as they are, or straightens them all.
     #[must_use]
-    pub fn of(plan: &Plan) -> Option<ClockPass> {
+    pub fn of(plan: &EstimationSettings) -> Option<ClockPass> {
         let is_left = plan.stamps == StampRepair::AsRecorded
             || plan.regularise_stamps
             || matches!(plan.clock, Clock::Index { .. });
@@ -141,7 +141,7 @@ mod tests {
     use crate::record::Nanos;
 
     fn verdict(header: impl Fn(i64) -> i64) -> ClockVerdict {
-        let mut pass = ClockPass::of(&Plan::default()).unwrap();
+        let mut pass = ClockPass::of(&EstimationSettings::default()).unwrap();
         for i in 0..2000 {
             let t = i as f64 * 0.005;
             pass.take(&RawSample {

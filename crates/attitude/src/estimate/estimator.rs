@@ -4,16 +4,16 @@
 //! does no I/O.
 
 use super::aiding::{self, Forces};
-use super::anew::Anew;
+use super::anew::RestartRequest;
 use super::gyro_watch::GyroWatch;
-use super::integrator::{Beside, Integrator};
+use super::integrator::{AuxiliaryVector, Integrator};
 use super::kept::{Spool, SpoolError};
 use super::meaning::Meaning;
-use super::plan::{Initial, Noise, Plan};
+use super::plan::{EstimationSettings, Initial, Noise};
 use super::preparation::Prepared;
-use super::settings_number::settings_number;
-use super::smoothing::{Recording, Smoothing, Told};
-use crate::aid::{self, Aided};
+use super::settings_fingerprint::settings_fingerprint;
+use super::smoothing::{Recording, Smoothing, SmoothingInputs};
+use crate::aid::{self, AidedPropagator};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
 use crate::consistency::Consistency;
@@ -22,7 +22,7 @@ use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
-use crate::smooth::{Beforehand, Looseness};
+use crate::smooth::{PriorScale, PriorSigmas};
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
 
@@ -35,11 +35,11 @@ pub struct Estimator {
     conditioner: Conditioner,
     regulariser: Option<Regulariser>,
     integrator: Integrator,
-    asked: Asked,
+    asked: OutputFrame,
     /// Vectors that came between the rates, each before the rate of this number.
-    beside: Vec<(usize, Nanos, Beside)>,
+    beside: Vec<(usize, Nanos, AuxiliaryVector)>,
     /// Auxiliary inputs; `None` where nothing of them is used.
-    besides: Option<Besides>,
+    besides: Option<AuxiliaryInputs>,
     /// Watch over the gyro, where somebody wants it; it changes no attitude and is not remembered.
     watch: Option<GyroWatch>,
     /// Tells settings apart under which a [`Memory`] means something else.
@@ -54,7 +54,7 @@ pub struct Estimator {
 
 /// Auxiliary inputs: what is taken beside the rates.
 #[derive(Debug)]
-struct Besides {
+struct AuxiliaryInputs {
     resolved: Meaning,
     clock: Clock,
     forces: Forces,
@@ -118,7 +118,7 @@ impl Estimator {
     /// # Errors
     /// In words, with the flag that helps: settings that cannot be.
     pub fn new(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         prepared: &Prepared,
     ) -> Result<Estimator, Diagnostic> {
@@ -138,7 +138,7 @@ impl Estimator {
     /// # Errors
     /// As [`Estimator::new`].
     pub fn live(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         prepared: &Prepared,
     ) -> Result<Estimator, Diagnostic> {
@@ -150,7 +150,7 @@ impl Estimator {
     }
 
     fn with(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         prepared: &Prepared,
         settings: &condition::Settings,
@@ -179,54 +179,56 @@ impl Estimator {
         let noise = propagation.noise;
         let integrator = match &prepared.aiding {
             None => Propagator::new(propagation).map(|p| Integrator::Alone(Box::new(p))),
-            Some(aiding) => Aided::new(propagation, aiding.settings, aiding.start).map(|aided| {
-                let aided = match aiding.forces {
-                    Forces::Beside => aided.with_forces_beside(),
-                    Forces::WithRates | Forces::Unseen => aided,
-                };
-                if plan.smooth {
-                    let heading = match aiding.start {
-                        aid::Start::Level | aid::Start::LevelBy(_) => None,
-                        aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
+            Some(aiding) => {
+                AidedPropagator::new(propagation, aiding.settings, aiding.start).map(|aided| {
+                    let aided = match aiding.forces {
+                        Forces::Beside => aided.with_forces_beside(),
+                        Forces::WithRates | Forces::Unseen => aided,
                     };
-                    let usual = aid::Settings::default();
-                    let told = Told {
-                        kind: resolved.kind,
-                        is_kind_stated: resolved.is_kind_stated,
-                        heading,
-                        looseness: Looseness {
-                            scale: aiding.settings.scale_prior / usual.scale_prior,
-                            axes: aiding.settings.cross_prior / usual.cross_prior,
-                            force: aiding.settings.force_bias_prior / usual.force_bias_prior,
-                        },
-                        bias_sigma: prepared.noise.bias_of_class(),
-                        gyro_range: aiding.settings.gyro_range,
-                        known: Beforehand {
-                            gyro_bias: aiding.stated_bias(prepared.bias_left.is_some()),
-                            ..resolved.beforehand()
-                        },
-                    };
-                    let smoothing = Smoothing::new(aided, told);
-                    Integrator::Smoothed(Box::new(smoothing))
-                } else {
-                    Integrator::Aided(Box::new(aided))
-                }
-            }),
+                    if plan.smooth {
+                        let heading = match aiding.start {
+                            aid::Start::Level | aid::Start::LevelBy(_) => None,
+                            aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
+                        };
+                        let usual = aid::Settings::default();
+                        let told = SmoothingInputs {
+                            kind: resolved.kind,
+                            is_kind_stated: resolved.is_kind_stated,
+                            heading,
+                            looseness: PriorScale {
+                                scale: aiding.settings.scale_prior / usual.scale_prior,
+                                axes: aiding.settings.cross_prior / usual.cross_prior,
+                                force: aiding.settings.force_bias_prior / usual.force_bias_prior,
+                            },
+                            bias_sigma: prepared.noise.bias_of_class(),
+                            gyro_range: aiding.settings.gyro_range,
+                            known: PriorSigmas {
+                                gyro_bias: aiding.stated_bias(prepared.bias_left.is_some()),
+                                ..resolved.beforehand()
+                            },
+                        };
+                        let smoothing = Smoothing::new(aided, told);
+                        Integrator::Smoothed(Box::new(smoothing))
+                    } else {
+                        Integrator::Aided(Box::new(aided))
+                    }
+                })
+            }
         }
         .map_err(|e| Diagnostic::from(&e))?;
         Ok(Estimator {
-            settings: settings_number(settings, plan, prepared, &noise),
+            settings: settings_fingerprint(settings, plan, prepared, &noise),
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
-            asked: Asked {
+            asked: OutputFrame {
                 delay: plan.sensor_delay_secs,
                 world: prepared.world,
                 north: (plan.declination != 0.0 && prepared.aiding.is_some())
                     .then(|| turned_north(plan.declination)),
             },
             beside: Vec::new(),
-            besides: prepared.aiding.map(|aiding| Besides {
+            besides: prepared.aiding.map(|aiding| AuxiliaryInputs {
                 resolved: resolved.clone(),
                 clock: prepared.clock,
                 forces: aiding.forces,
@@ -291,16 +293,16 @@ impl Estimator {
 
     /// Begins as the run after that of `before`, whose samples stay counted: the first attitude says
     /// that it was reset.
-    pub fn succeed(&mut self, before: &condition::Report, resets: u32) {
-        self.conditioner.succeed(before);
-        self.integrator.succeed(resets);
+    pub fn continue_counts_of(&mut self, before: &condition::Report, resets: u32) {
+        self.conditioner.continue_counts_of(before);
+        self.integrator.continue_counts_of(resets);
     }
 
     /// The next sample begins the attitude anew, and says so ([`Status::RESET`]); the run and what was learned of
     /// the sensor go on.
     ///
     /// [`Status::RESET`]: crate::record::Status::RESET
-    pub fn begin_anew(&mut self, anew: &Anew) {
+    pub fn begin_anew(&mut self, anew: &RestartRequest) {
         self.integrator.begin_anew(anew);
         self.begins_anew = true;
     }
@@ -336,7 +338,7 @@ impl Estimator {
     }
 
     /// Takes the specific force, or the magnetic field, of a message that carries no rate: of topics, and at
-    /// rates, of their own. What is not asked for ([`Plan::aid`]), and a force where forces come with the rates
+    /// rates, of their own. What is not asked for ([`EstimationSettings::aid`]), and a force where forces come with the rates
     /// ([`Forces`]), is passed over.
     pub fn take_beside(&mut self, raw: &RawSample) {
         self.take_field(raw);
@@ -361,7 +363,8 @@ impl Estimator {
         });
         let force = resolved.calibrated_force(force, scale);
         let place = self.rates.len();
-        self.beside.push((place, stamp, Beside::Force(force)));
+        self.beside
+            .push((place, stamp, AuxiliaryVector::Force(force)));
     }
 
     fn take_field(&mut self, raw: &RawSample) {
@@ -375,7 +378,8 @@ impl Estimator {
         let (field, lead) = besides.resolved.field(field);
         let stamp = Nanos(stamp.0.saturating_add((lead * 1e9).round() as i64));
         let place = self.rates.len();
-        self.beside.push((place, stamp, Beside::Field(field)));
+        self.beside
+            .push((place, stamp, AuxiliaryVector::Field(field)));
     }
 
     /// A payload that could not be decoded stood here in the stream.
@@ -456,7 +460,7 @@ impl Estimator {
             self.rates
                 .extend_from_slice(rates.get(from..place).unwrap_or(&[]));
             self.push_rates(exec);
-            if let (Some(watch), Beside::Force(force)) = (&mut self.watch, &beside) {
+            if let (Some(watch), AuxiliaryVector::Force(force)) = (&mut self.watch, &beside) {
                 watch.take_force(stamp, *force);
             }
             self.integrator.take_beside(stamp, beside);
@@ -553,7 +557,7 @@ impl Estimator {
 
 /// Output frame of attitudes: in which world, of which instant.
 #[derive(Clone, Copy, Debug)]
-struct Asked {
+struct OutputFrame {
     /// Delay of the sensor's own filters, s.
     delay: f64,
     world: World,
@@ -561,7 +565,7 @@ struct Asked {
     north: Option<Quaternion<Nav, Nav>>,
 }
 
-impl Asked {
+impl OutputFrame {
     /// Converts from the convention everything is computed in (ENU or start, FLU) to the one asked for: world and
     /// body change together.
     fn apply(&self, out: &mut [AttitudeSample]) {
@@ -601,7 +605,11 @@ impl Asked {
     }
 }
 
-fn conditioning(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> condition::Settings {
+fn conditioning(
+    plan: &EstimationSettings,
+    resolved: &Meaning,
+    prepared: &Prepared,
+) -> condition::Settings {
     let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
     let scale = prepared.aiding.map_or(1.0, |aiding| aiding.force_scale);
     condition::Settings {

@@ -4,7 +4,7 @@
 //! the run, with no bias taken out, on the clock the first of them choose.
 
 use super::meaning::Meaning;
-use super::plan::Plan;
+use super::plan::EstimationSettings;
 use crate::condition::stillness::{Limits, Rests, Stillness};
 use crate::condition::{ClockSet, Conditioner, choose_clock_as};
 use crate::diagnostic::Diagnostic;
@@ -19,7 +19,7 @@ pub(super) const MANY: usize = 200_000;
 /// Samples as the run will condition them.
 #[derive(Debug)]
 pub struct Conditioned {
-    plan: Plan,
+    plan: EstimationSettings,
     resolved: Meaning,
     gathered: Vec<RawSample>,
     running: Option<Conditioner>,
@@ -29,7 +29,7 @@ pub struct Conditioned {
 impl Conditioned {
     /// Makes one for samples understood as `resolved`.
     #[must_use]
-    pub fn new(plan: &Plan, resolved: &Meaning) -> Conditioned {
+    pub fn new(plan: &EstimationSettings, resolved: &Meaning) -> Conditioned {
         Conditioned {
             plan: plan.clone(),
             resolved: resolved.clone(),
@@ -115,7 +115,7 @@ pub(super) struct RestPass {
 
 impl RestPass {
     /// Makes one for samples understood as `resolved`.
-    pub(super) fn new(plan: &Plan, resolved: &Meaning) -> RestPass {
+    pub(super) fn new(plan: &EstimationSettings, resolved: &Meaning) -> RestPass {
         RestPass {
             conditioned: Conditioned::new(plan, resolved),
             detector: Stillness::new(Limits::default()),

@@ -2,10 +2,10 @@
 //!
 //! Apart from the estimator because what integrates is chosen once, and everything around it is the same.
 
-use super::anew::Anew;
+use super::anew::RestartRequest;
 use super::kept::{Spool, SpoolError};
 use super::smoothing::{Recording, Smoothing};
-use crate::aid::{self, Aided};
+use crate::aid::{self, AidedPropagator};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In};
 use crate::propagate::{self, Executor, Method, Propagator};
@@ -13,7 +13,7 @@ use crate::record::{AttitudeSample, Nanos, RateSample};
 
 /// A vector measured beside the gyro.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Beside {
+pub(super) enum AuxiliaryVector {
     /// Specific force, m/s^2.
     Force(In<Body>),
     /// Magnetic field.
@@ -24,7 +24,7 @@ pub(super) enum Beside {
 #[derive(Debug)]
 pub(super) enum Integrator {
     Alone(Box<Propagator>),
-    Aided(Box<Aided>),
+    Aided(Box<AidedPropagator>),
     /// All at the end; of nothing else than a whole recording.
     Smoothed(Box<Smoothing>),
 }
@@ -44,15 +44,19 @@ impl Integrator {
         }
     }
 
-    pub(super) fn take_beside(&mut self, stamp: Nanos, beside: Beside) {
+    pub(super) fn take_beside(&mut self, stamp: Nanos, beside: AuxiliaryVector) {
         match (self, beside) {
             (Integrator::Alone(_), _) => {}
-            (Integrator::Aided(aided), Beside::Force(force)) => aided.take_force(stamp, force),
-            (Integrator::Aided(aided), Beside::Field(field)) => aided.take_field(stamp, field),
-            (Integrator::Smoothed(smoothing), Beside::Force(force)) => {
+            (Integrator::Aided(aided), AuxiliaryVector::Force(force)) => {
+                aided.take_force(stamp, force)
+            }
+            (Integrator::Aided(aided), AuxiliaryVector::Field(field)) => {
+                aided.take_field(stamp, field)
+            }
+            (Integrator::Smoothed(smoothing), AuxiliaryVector::Force(force)) => {
                 smoothing.take_force(stamp, force);
             }
-            (Integrator::Smoothed(smoothing), Beside::Field(field)) => {
+            (Integrator::Smoothed(smoothing), AuxiliaryVector::Field(field)) => {
                 smoothing.take_field(stamp, field);
             }
         }
@@ -131,15 +135,15 @@ impl Integrator {
         }
     }
 
-    pub(super) fn succeed(&mut self, resets: u32) {
+    pub(super) fn continue_counts_of(&mut self, resets: u32) {
         match self {
-            Integrator::Alone(propagator) => propagator.succeed(resets),
-            Integrator::Aided(aided) => aided.succeed(resets),
+            Integrator::Alone(propagator) => propagator.continue_counts_of(resets),
+            Integrator::Aided(aided) => aided.continue_counts_of(resets),
             Integrator::Smoothed(_) => {}
         }
     }
 
-    pub(super) fn begin_anew(&mut self, anew: &Anew) {
+    pub(super) fn begin_anew(&mut self, anew: &RestartRequest) {
         match self {
             Integrator::Alone(propagator) => propagator.begin_anew(&anew.attitude),
             Integrator::Aided(aided) => aided.begin_anew(&anew.attitude, anew.start),
@@ -161,7 +165,7 @@ impl Integrator {
     }
 
     /// Filter that corrects, or runs along with the smoother.
-    fn aided(&self) -> Option<&Aided> {
+    fn aided(&self) -> Option<&AidedPropagator> {
         match self {
             Integrator::Alone(_) => None,
             Integrator::Aided(aided) => Some(aided),
@@ -170,7 +174,7 @@ impl Integrator {
     }
 
     pub(super) fn filter(&self) -> Option<&aid::Filter> {
-        self.aided().map(Aided::filter)
+        self.aided().map(AidedPropagator::filter)
     }
 
     /// `None` where nobody asked for a smoother, or the end has not come.
@@ -184,14 +188,14 @@ impl Integrator {
     pub(super) fn propagation(&self) -> propagate::Report {
         match (self, self.aided()) {
             (Integrator::Alone(propagator), _) => propagator.report(),
-            (_, aided) => aided.map(Aided::propagation).unwrap_or_default(),
+            (_, aided) => aided.map(AidedPropagator::propagation).unwrap_or_default(),
         }
     }
 
     pub(super) fn method(&self) -> Method {
         match (self, self.aided()) {
             (Integrator::Alone(propagator), _) => propagator.method(),
-            (_, aided) => aided.map_or(Method::Auto, Aided::method),
+            (_, aided) => aided.map_or(Method::Auto, AidedPropagator::method),
         }
     }
 }

@@ -55,7 +55,7 @@ pub(super) enum Event {
 
 /// Events in the order in which they came.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(super) struct SampleStore {
     filling: Vec<u8>,
     /// Pieces in memory, while there are few.
     pieces: Vec<Vec<u8>>,
@@ -67,9 +67,9 @@ pub(super) struct Kept {
     failure: Option<io::Error>,
 }
 
-impl Default for Kept {
-    fn default() -> Kept {
-        Kept {
+impl Default for SampleStore {
+    fn default() -> SampleStore {
+        SampleStore {
             filling: Vec::new(),
             pieces: Vec::new(),
             spooled: Vec::new(),
@@ -81,13 +81,13 @@ impl Default for Kept {
     }
 }
 
-impl Kept {
+impl SampleStore {
     /// Makes one with so many bytes in memory.
     #[cfg(test)]
-    pub(super) fn of_at_most(most: u64) -> Kept {
-        Kept {
+    pub(super) fn of_at_most(most: u64) -> SampleStore {
+        SampleStore {
             most,
-            ..Kept::default()
+            ..SampleStore::default()
         }
     }
 
@@ -328,7 +328,7 @@ mod tests {
         out
     }
 
-    fn given(kept: &mut Kept) -> Vec<Event> {
+    fn given(kept: &mut SampleStore) -> Vec<Event> {
         let mut out = Vec::new();
         kept.give(|event| out.push(event)).unwrap();
         out
@@ -337,7 +337,7 @@ mod tests {
     #[test]
     fn events_come_back_with_their_bits_from_memory_and_from_a_file_as_often_as_asked() {
         let events = events(60_000);
-        let (mut held, mut spooled) = (Kept::default(), Kept::of_at_most(1 << 20));
+        let (mut held, mut spooled) = (SampleStore::default(), SampleStore::of_at_most(1 << 20));
         spooled.spool_to(Box::new(Cursor::new(Vec::new())));
         for event in &events {
             held.push(event);
@@ -391,7 +391,7 @@ mod tests {
 
     #[test]
     fn a_full_disk_is_an_error_and_not_a_shorter_recording() {
-        let mut kept = Kept::of_at_most(0);
+        let mut kept = SampleStore::of_at_most(0);
         kept.spool_to(Box::new(Full(Cursor::default(), 3 << 20)));
         events(100_000).iter().for_each(|event| kept.push(event));
         for _ in 0..2 {

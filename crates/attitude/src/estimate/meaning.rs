@@ -2,7 +2,7 @@
 //!
 //! Apart from the preparation because it needs no sample: what is asked for wins over what is declared.
 
-use super::plan::Plan;
+use super::plan::EstimationSettings;
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{Clock, GyroUnit, Settings};
 use crate::frames::{AxisMap, Body, BodyAxes, Dcm, In, Nav, Sensor};
@@ -57,7 +57,7 @@ struct SensorMaps {
 }
 
 impl SensorMaps {
-    fn of(plan: &Plan) -> SensorMaps {
+    fn of(plan: &EstimationSettings) -> SensorMaps {
         let map = |axes: AxisMap, scale: [f64; 3]| {
             axes.matrix() * Matrix3::from_diagonal(&Vector3::from(scale))
         };
@@ -72,7 +72,7 @@ impl SensorMaps {
 impl Meaning {
     /// Puts `plan` and what the channel's format states together.
     #[must_use]
-    pub fn new(plan: &Plan, declared: &Declared) -> Meaning {
+    pub fn new(plan: &EstimationSettings, declared: &Declared) -> Meaning {
         let body = plan.body.or(declared.body).unwrap_or(BodyAxes::Flu);
         let unit = plan.unit.or(declared.gyro_unit).unwrap_or_default();
         let mount = plan.mount.unwrap_or_else(Quaternion::identity).to_dcm();
@@ -113,7 +113,12 @@ impl Meaning {
 
     /// The settings of the conditioning stage: `bias` is what is taken out of calibrated rates.
     #[must_use]
-    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: BodyRate) -> Settings {
+    pub fn conditioning(
+        &self,
+        plan: &EstimationSettings,
+        clock: Clock,
+        bias: BodyRate,
+    ) -> Settings {
         let known = self.calibration.as_deref();
         let matrix =
             |of: fn(&SensorCalibration) -> Matrix3<f64>| known.map_or_else(Matrix3::identity, of);
@@ -236,7 +241,7 @@ impl Meaning {
 
     /// Whether the output's body axes are other than the sensor's own.
     #[must_use]
-    pub fn is_remapped(&self, plan: &Plan, world: World) -> bool {
+    pub fn is_remapped(&self, plan: &EstimationSettings, world: World) -> bool {
         let own = match self.body {
             BodyAxes::Flu => "flu",
             BodyAxes::Frd => "frd",

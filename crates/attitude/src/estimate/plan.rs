@@ -25,9 +25,9 @@ const BIAS_LEFT: f64 = 1e-3;
 const BIAS_LEFT_BY_REST: f64 = 2.6e-3;
 
 /// Settings by which the samples of a run are understood and integrated, as a person gives them by the rows of
-/// [`ROWS`](super::settings::ROWS), or a program by its fields. [`Plan::check`] refuses what cannot be.
+/// [`ROWS`](super::settings::ROWS), or a program by its fields. [`EstimationSettings::check`] refuses what cannot be.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct EstimationSettings {
     /// Method by which rates become rotations, with its window and order. A centred one is the most accurate, a causal
     /// one and `commit` need no later sample. Default: [`Method::Auto`]. Settings `method`, `window`, `order`.
     pub method: Method,
@@ -149,10 +149,10 @@ pub enum Truncation {
     Off,
 }
 
-impl Default for Plan {
+impl Default for EstimationSettings {
     /// Defaults of [`settings`](super::settings::defaults), but for [`Aid::None`].
-    fn default() -> Plan {
-        Plan {
+    fn default() -> EstimationSettings {
+        EstimationSettings {
             method: Method::Auto,
             kind: None,
             unit: None,
@@ -191,7 +191,7 @@ impl Default for Plan {
     }
 }
 
-impl Plan {
+impl EstimationSettings {
     /// Whether a step of so many nanoseconds is integrated across.
     #[must_use]
     pub fn bridges(&self, nanos: i64) -> bool {
@@ -353,25 +353,25 @@ impl Plan {
             return Ok(());
         }
         let refused = match self {
-            Plan { aid: Aid::None, .. } => {
+            EstimationSettings { aid: Aid::None, .. } => {
                 Diagnostic::new(format!("{AID} none: a smoother needs the accelerometer")).help(
                     format!("{AID} gravity or gravity+mag; without {SMOOTH} the gyro alone"),
                 )
             }
-            Plan { method, .. } if *method != Method::Auto => Diagnostic::new(format!(
-                "{METHOD}: a smoother integrates between its nodes by itself"
-            ))
+            EstimationSettings { method, .. } if *method != Method::Auto => Diagnostic::new(
+                format!("{METHOD}: a smoother integrates between its nodes by itself"),
+            )
             .help("leave one of the two out"),
-            Plan {
+            EstimationSettings {
                 latitude_deg: Some(_),
                 ..
             } => Diagnostic::new(format!(
                 "{EARTH_RATE}: the smoother takes the Earth's rotation for bias"
             ))
             .help("leave one of the two out"),
-            Plan { mag_hard_iron, .. } if *mag_hard_iron != 0.0 => Diagnostic::new(format!(
-                "{MAG_HARD_IRON}: a smoother learns the magnetometer's errors by itself"
-            ))
+            EstimationSettings { mag_hard_iron, .. } if *mag_hard_iron != 0.0 => Diagnostic::new(
+                format!("{MAG_HARD_IRON}: a smoother learns the magnetometer's errors by itself"),
+            )
             .help("leave it out"),
             _ => return Ok(()),
         };
@@ -411,7 +411,7 @@ pub enum Initial {
     Gravity,
     /// The first recorded orientation.
     FirstOrientation,
-    /// Attitude as given, in the convention of [`Plan::world`].
+    /// Attitude as given, in the convention of [`EstimationSettings::world`].
     Given(Quaternion<Nav, Body>),
 }
 

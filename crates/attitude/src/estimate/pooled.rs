@@ -3,7 +3,7 @@
 //! Each recording is looked at by itself, and none begins with what another has told: that two of them differ by more
 //! than they claim to know would not be seen otherwise.
 
-use super::sensor_calibration::{Known, SensorCalibration};
+use super::sensor_calibration::{CalibrationTerm, SensorCalibration};
 
 /// Numbers that another recording has told too, before their scatter says something.
 const ENOUGH: u32 = 3;
@@ -78,8 +78,8 @@ impl Scatter {
     fn pool<const N: usize>(
         &mut self,
         recordings: &[SensorCalibration],
-        of: impl Fn(&SensorCalibration) -> Option<&Known<N>>,
-    ) -> Option<Known<N>> {
+        of: impl Fn(&SensorCalibration) -> Option<&CalibrationTerm<N>>,
+    ) -> Option<CalibrationTerm<N>> {
         let mut pooled = *recordings.iter().rev().find_map(&of)?;
         let mut sigmas = pooled.sigma.unwrap_or([f64::INFINITY; N]);
         for (i, pooled_sigma) in sigmas.iter_mut().enumerate() {
@@ -105,8 +105,8 @@ impl Scatter {
 }
 
 /// The mean, with how the recordings know it and how it differs between them.
-fn bias(recordings: &[SensorCalibration]) -> Option<Known<3>> {
-    let biases: Vec<Known<3>> = recordings.iter().filter_map(|r| r.bias).collect();
+fn bias(recordings: &[SensorCalibration]) -> Option<CalibrationTerm<3>> {
+    let biases: Vec<CalibrationTerm<3>> = recordings.iter().filter_map(|r| r.bias).collect();
     let mut pooled = *biases.last()?;
     let mut sigmas = pooled.sigma?;
     for (i, pooled_sigma) in sigmas.iter_mut().enumerate() {
@@ -128,7 +128,7 @@ fn bias(recordings: &[SensorCalibration]) -> Option<Known<3>> {
     Some(pooled)
 }
 
-fn widen<const N: usize>(known: &mut Option<Known<N>>, by: f64) {
+fn widen<const N: usize>(known: &mut Option<CalibrationTerm<N>>, by: f64) {
     if let Some(sigma) = known.as_mut().and_then(|known| known.sigma.as_mut()) {
         *sigma = sigma.map(|sigma| sigma * by);
     }
@@ -139,8 +139,8 @@ fn widen<const N: usize>(known: &mut Option<Known<N>>, by: f64) {
 mod tests {
     use super::*;
 
-    fn known<const N: usize>(value: f64, sigma: f64) -> Option<Known<N>> {
-        Some(Known {
+    fn known<const N: usize>(value: f64, sigma: f64) -> Option<CalibrationTerm<N>> {
+        Some(CalibrationTerm {
             value: [value; N],
             sigma: Some([sigma; N]),
             observed: [true; N],

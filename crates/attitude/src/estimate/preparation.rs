@@ -12,7 +12,7 @@ use super::clock_pass::ClockPass;
 use super::first_pass::{FEW, MANY, RestPass};
 use super::intervals::Mismatch;
 use super::meaning::Meaning;
-use super::plan::{Aid, Bias, Initial, Noise, Plan, Truncation};
+use super::plan::{Aid, Bias, EstimationSettings, Initial, Noise, Truncation};
 use super::stamps::{StampPass, Stamps};
 use crate::condition::rails::{Clipped, Rails};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
@@ -89,7 +89,7 @@ pub enum Patience {
 /// Takes the first samples (or all of them, when rest is sought), then decides.
 #[derive(Debug)]
 pub struct Preparation {
-    plan: Plan,
+    plan: EstimationSettings,
     resolved: Meaning,
     patience: Patience,
     first: Vec<RawSample>,
@@ -114,7 +114,7 @@ pub struct Preparation {
 impl Preparation {
     /// Makes one for samples understood as `resolved`.
     #[must_use]
-    pub fn new(plan: &Plan, resolved: &Meaning, patience: Patience) -> Preparation {
+    pub fn new(plan: &EstimationSettings, resolved: &Meaning, patience: Patience) -> Preparation {
         Preparation {
             plan: plan.clone(),
             resolved: resolved.clone(),
@@ -253,19 +253,8 @@ impl Preparation {
             class,
             ..
         } = self;
-        let (clock, warning) = choose_clock_as(&first, plan.clock, plan.stamps);
-        if let Some(fatal @ ClockWarning::NoneMoves) = warning {
-            return Err(Diagnostic::from(&fatal));
-        }
-        let mut warnings: Vec<Diagnostic> = warning.iter().map(Diagnostic::from).collect();
-        let clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
-        warnings.extend(clocks.of_batches.into_iter().chain(clocks.of_speed));
-        if let Some(mismatch) = Mismatch::between(&first, clock, resolved.kind) {
-            if !resolved.interval_unit_given {
-                return Err(mismatch.refusal(resolved.interval.as_ref()));
-            }
-            warnings.push(format!("{mismatch}: what lies between is bridged").into());
-        }
+        let mut warnings = Vec::new();
+        let (clock, batches) = decide_clock((&plan, &resolved), &first, clocks, &mut warnings)?;
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         // The method of a daemon decides as a daemon: by the first sample.
         let (looked_at, is_beside) = match plan.method {
@@ -274,12 +263,12 @@ impl Preparation {
             }
             _ => (first.as_slice(), forces_beside[0]),
         };
-        let plan = Plan {
+        let plan = EstimationSettings {
             has_forces_beside: plan.has_forces_beside
                 || (is_beside && looked_at.iter().all(|raw| raw.accel.is_none())),
             ..plan
         };
-        let plan = Plan {
+        let plan = EstimationSettings {
             gyro_range: plan.gyro_range.or_else(|| clipped_at(rails, &mut warnings)),
             ..plan
         };
@@ -332,20 +321,7 @@ impl Preparation {
                 *prior = prior.hypot(bias_sigma.max());
             }
         }
-        let found = stamps.map(StampPass::finish).transpose()?;
-        let stamps = match (found, patience) {
-            (None, _) => Stamps::AsRecorded,
-            (
-                Some(Stamps::OnLines {
-                    states_interval, ..
-                }),
-                Patience::FirstMinute,
-            ) => {
-                warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers").into());
-                Stamps::Causal { states_interval }
-            }
-            (Some(stamps), _) => stamps,
-        };
+        let stamps = decide_stamps(stamps, patience, &mut warnings)?;
         warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
         // What was gathered for an attitude that is aided is of no use to another.
         let is_wanted = aiding.is_some() || plan.truncation != Truncation::Unsaid;
@@ -368,7 +344,7 @@ impl Preparation {
             world,
             stamps,
             has_arrival: true,
-            batches: clocks.batches,
+            batches,
             warnings,
         };
         let told = class.zip(prepared.aiding).and_then(|(class, aiding)| {
@@ -392,10 +368,55 @@ impl Preparation {
     }
 }
 
+/// Decides whose stamps count, and whether they are those of batches.
+fn decide_clock(
+    (plan, resolved): (&EstimationSettings, &Meaning),
+    first: &[RawSample],
+    clocks: Option<ClockPass>,
+    warnings: &mut Vec<Diagnostic>,
+) -> Result<(Clock, Option<BatchRate>), Diagnostic> {
+    let (clock, warning) = choose_clock_as(first, plan.clock, plan.stamps);
+    if let Some(fatal @ ClockWarning::NoneMoves) = warning {
+        return Err(Diagnostic::from(&fatal));
+    }
+    warnings.extend(warning.iter().map(Diagnostic::from));
+    let clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
+    warnings.extend(clocks.of_batches.into_iter().chain(clocks.of_speed));
+    if let Some(mismatch) = Mismatch::between(first, clock, resolved.kind) {
+        if !resolved.interval_unit_given {
+            return Err(mismatch.refusal(resolved.interval.as_ref()));
+        }
+        warnings.push(format!("{mismatch}: what lies between is bridged").into());
+    }
+    Ok((clock, clocks.batches))
+}
+
+/// Decides how stamps are made regular, where that was asked for.
+fn decide_stamps(
+    pass: Option<StampPass>,
+    patience: Patience,
+    warnings: &mut Vec<Diagnostic>,
+) -> Result<Stamps, Diagnostic> {
+    let found = pass.map(StampPass::finish).transpose()?;
+    Ok(match (found, patience) {
+        (None, _) => Stamps::AsRecorded,
+        (
+            Some(Stamps::OnLines {
+                states_interval, ..
+            }),
+            Patience::FirstMinute,
+        ) => {
+            warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers").into());
+            Stamps::Causal { states_interval }
+        }
+        (Some(stamps), _) => stamps,
+    })
+}
+
 /// Settings with what only rest tells, as the beginning of what a filter learns: level by the first specific force,
 /// no bias.
-pub(super) fn learned_on_the_way(plan: &Plan) -> Plan {
-    Plan {
+pub(super) fn learned_on_the_way(plan: &EstimationSettings) -> EstimationSettings {
+    EstimationSettings {
         initial: match plan.initial {
             Initial::Gravity => Initial::Identity,
             other => other,
@@ -415,7 +436,7 @@ pub(super) fn learned_on_the_way(plan: &Plan) -> Plan {
 /// # Errors
 /// In words: what only rest can tell was asked for of a gyro alone, or the sample carries no orientation to begin with.
 pub fn at_once(
-    plan: &Plan,
+    plan: &EstimationSettings,
     resolved: &Meaning,
     together: &[RawSample],
 ) -> Result<Prepared, Diagnostic> {
@@ -423,7 +444,7 @@ pub fn at_once(
     let is_force = |raw: &RawSample| raw.is_beside && raw.accel.is_some();
     let first = together.iter().find(|raw| !raw.is_beside);
     let first = &first.copied().unwrap_or_default();
-    let plan = &Plan {
+    let plan = &EstimationSettings {
         has_forces_beside: asked.has_forces_beside
             || (first.accel.is_none() && together.iter().any(is_force)),
         ..learned_on_the_way(asked)
@@ -498,7 +519,7 @@ fn clipped_at(rails: Option<Rails>, warnings: &mut Vec<Diagnostic>) -> Option<f6
 }
 
 /// Whether the plan asks for something only rest can tell.
-fn needs_rest(plan: &Plan) -> bool {
+fn needs_rest(plan: &EstimationSettings) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
 }
 
@@ -511,7 +532,7 @@ fn is_live(method: Method) -> bool {
 }
 
 /// Whether it is to be seen from the data if their driver has cut them.
-fn looks_for_truncation(plan: &Plan) -> bool {
+fn looks_for_truncation(plan: &EstimationSettings) -> bool {
     match plan.truncation {
         Truncation::Unsaid => plan.aid != Aid::None,
         Truncation::Auto | Truncation::On => true,
@@ -522,7 +543,7 @@ fn looks_for_truncation(plan: &Plan) -> bool {
 /// `rates` are those of a file that can be read twice, where they are looked at. What they do not tell, a calibration
 /// may.
 fn decide_truncation(
-    plan: &Plan,
+    plan: &EstimationSettings,
     rates: Option<&[[f64; 3]]>,
     warnings: &mut Vec<Diagnostic>,
 ) -> Result<Option<f64>, Diagnostic> {
@@ -589,7 +610,7 @@ fn decide_truncation(
 
 /// `gathered` are the first samples.
 pub(super) fn decide_initial(
-    (plan, aiding): (&Plan, Option<&Aiding>),
+    (plan, aiding): (&EstimationSettings, Option<&Aiding>),
     resolved: &Meaning,
     gathered: &[RawSample],
     rests: &Rests,

@@ -18,7 +18,7 @@ const STEP: f64 = 1.0;
 
 /// Numbers of a calibration with what is known of each. Matrices row by row.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Known<const N: usize> {
+pub struct CalibrationTerm<const N: usize> {
     /// The numbers.
     pub value: [f64; N],
     /// One standard deviation of each.
@@ -27,7 +27,7 @@ pub struct Known<const N: usize> {
     pub observed: [bool; N],
 }
 
-impl<const N: usize> Known<N> {
+impl<const N: usize> CalibrationTerm<N> {
     /// One standard deviation of a number that data have told.
     #[must_use]
     pub fn sigma_of(&self, i: usize) -> Option<f64> {
@@ -82,23 +82,23 @@ pub struct SensorCalibration {
     /// Names of the recordings that it comes from.
     pub sources: Vec<String>,
     /// Gyro bias, rad/s.
-    pub bias: Option<Known<3>>,
+    pub bias: Option<CalibrationTerm<3>>,
     /// G: scale and axes of the gyro.
-    pub gyro: Option<Known<9>>,
+    pub gyro: Option<CalibrationTerm<9>>,
     /// ba: accelerometer bias, m/s^2.
-    pub force_bias: Option<Known<3>>,
+    pub force_bias: Option<CalibrationTerm<3>>,
     /// A: scale and axes of the accelerometer.
-    pub force: Option<Known<9>>,
+    pub force: Option<CalibrationTerm<9>>,
     /// Accelerometer lead, s.
-    pub lead: Option<Known<1>>,
+    pub lead: Option<CalibrationTerm<1>>,
     /// h: hard iron.
-    pub hard_iron: Option<Known<3>>,
+    pub hard_iron: Option<CalibrationTerm<3>>,
     /// S: soft iron.
-    pub soft_iron: Option<Known<9>>,
+    pub soft_iron: Option<CalibrationTerm<9>>,
     /// Lead of the magnetometer, s.
-    pub field_lead: Option<Known<1>>,
+    pub field_lead: Option<CalibrationTerm<1>>,
     /// Step in which the driver cuts the rates towards zero, rad/s.
-    pub truncation_step: Option<Known<1>>,
+    pub truncation_step: Option<CalibrationTerm<1>>,
 }
 
 impl SensorCalibration {
@@ -108,7 +108,7 @@ impl SensorCalibration {
     /// In words, naming the key.
     pub fn check(&self) -> Result<(), Diagnostic> {
         fn of<const N: usize>(
-            known: &Option<Known<N>>,
+            known: &Option<CalibrationTerm<N>>,
             key: &str,
             unit: &str,
             largest: f64,
@@ -203,12 +203,12 @@ impl SensorCalibration {
     }
 }
 
-fn matrix(known: Option<&Known<9>>) -> Matrix3<f64> {
+fn matrix(known: Option<&CalibrationTerm<9>>) -> Matrix3<f64> {
     known.map_or_else(Matrix3::identity, |known| {
         Matrix3::identity() + Matrix3::from_row_slice(&known.value)
     })
 }
 
-fn vector(known: Option<&Known<3>>) -> Vector3<f64> {
+fn vector(known: Option<&CalibrationTerm<3>>) -> Vector3<f64> {
     known.map_or_else(Vector3::zeros, |known| known.value.into())
 }

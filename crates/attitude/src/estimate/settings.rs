@@ -1,7 +1,7 @@
 //! The settings of an estimation, one row each -> a plan. Pure.
 //!
 //! A stage of its own because a setting is met as a flag of the command, an argument in Python, a key of a file, a line of
-//! the manual and of `docs/settings.md`. All of them are made from its [`Row`], so that a new one is a field of [`Plan`]
+//! the manual and of `docs/settings.md`. All of them are made from its [`Row`], so that a new one is a field of [`EstimationSettings`]
 //! and a row of [`ROWS`].
 //!
 //! ```
@@ -20,7 +20,7 @@ mod rows;
 
 pub use rows::ROWS;
 
-use super::plan::{Aid, Noise, Plan};
+use super::plan::{Aid, EstimationSettings, Noise};
 use super::sensor_calibration::SensorCalibration;
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, Nav, Sensor};
@@ -49,7 +49,7 @@ pub struct Row {
     /// Values that are taken besides the words.
     pub takes: Takes,
     /// Refuses the setting where a row before it rules it out.
-    pub needs: fn(&Plan) -> Result<(), Diagnostic>,
+    pub needs: fn(&EstimationSettings) -> Result<(), Diagnostic>,
 }
 
 /// Value of a setting that is not given.
@@ -69,7 +69,7 @@ pub struct Word {
     /// Meaning in one line.
     pub meaning: &'static str,
     /// Puts it into a plan.
-    pub set: fn(&mut Plan),
+    pub set: fn(&mut EstimationSettings),
 }
 
 /// Values that a setting takes besides its words, and how they are put into a plan.
@@ -78,7 +78,7 @@ pub enum Takes {
     /// Nothing but the words.
     Words,
     /// A switch, on or off.
-    Switch(fn(&mut Plan, bool)),
+    Switch(fn(&mut EstimationSettings, bool)),
     /// A number.
     Number {
         /// Text before the number, where words precede it.
@@ -88,29 +88,29 @@ pub enum Takes {
         /// Least and largest.
         range: (f64, f64),
         /// Puts it into a plan.
-        set: fn(&mut Plan, f64),
+        set: fn(&mut EstimationSettings, f64),
     },
     /// A number of samples.
-    Count(fn(&mut Plan, usize)),
+    Count(fn(&mut EstimationSettings, usize)),
     /// Three numbers about the body axes x, y, z, rad/s.
-    Rate(fn(&mut Plan, [f64; 3])),
+    Rate(fn(&mut EstimationSettings, [f64; 3])),
     /// A factor above 0 of each axis, or one for all.
-    Factors(fn(&mut Plan, [f64; 3])),
+    Factors(fn(&mut EstimationSettings, [f64; 3])),
     /// A mounting, as a unit quaternion w, x, y, z.
-    Mounting(fn(&mut Plan, Quaternion<Body, Sensor>)),
+    Mounting(fn(&mut EstimationSettings, Quaternion<Body, Sensor>)),
     /// An attitude: a unit quaternion w, x, y, z, or roll, pitch and yaw in degrees.
-    Attitude(fn(&mut Plan, Quaternion<Nav, Body>)),
+    Attitude(fn(&mut EstimationSettings, Quaternion<Nav, Body>)),
     /// A text of its own.
     Text {
         /// Description of the text.
         what: &'static str,
         /// Reads it into a plan.
-        set: fn(&mut Plan, &str) -> Result<(), Diagnostic>,
+        set: fn(&mut EstimationSettings, &str) -> Result<(), Diagnostic>,
     },
     /// Figures of noise by their names ([`NOISE_FIGURES`](super::NOISE_FIGURES)).
-    Figures(fn(&mut Plan, Noise)),
+    Figures(fn(&mut EstimationSettings, Noise)),
     /// A calibration, read from its file by whoever may read files.
-    Calibration(fn(&mut Plan, Arc<SensorCalibration>)),
+    Calibration(fn(&mut EstimationSettings, Arc<SensorCalibration>)),
 }
 
 /// A value that is given.
@@ -148,10 +148,10 @@ impl fmt::Display for Value<'_> {
 
 /// Plan of a run in which nothing is given: every default of [`ROWS`].
 #[must_use]
-pub fn defaults() -> Plan {
-    Plan {
+pub fn defaults() -> EstimationSettings {
+    EstimationSettings {
         aid: Aid::Auto,
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
@@ -165,7 +165,7 @@ pub fn row(name: &str) -> Option<&'static Row> {
 ///
 /// # Errors
 /// [`Row::apply`]; the setting is none of an estimation.
-pub fn with(setting: Setting, text: &str) -> Result<Plan, Diagnostic> {
+pub fn with(setting: Setting, text: &str) -> Result<EstimationSettings, Diagnostic> {
     let mut plan = defaults();
     let row = row(setting.name()).ok_or_else(|| format!("{setting}: is no setting"))?;
     row.apply(&mut plan, &Value::Text(text))?;
@@ -257,8 +257,12 @@ impl Row {
     ///
     /// # Errors
     /// Diagnostic that names the setting: the value is none of it, or a setting before it rules it out. What only the plan as
-    /// a whole can tell, [`Plan::check`] refuses.
-    pub fn apply(&self, plan: &mut Plan, value: &Value<'_>) -> Result<(), Diagnostic> {
+    /// a whole can tell, [`EstimationSettings::check`] refuses.
+    pub fn apply(
+        &self,
+        plan: &mut EstimationSettings,
+        value: &Value<'_>,
+    ) -> Result<(), Diagnostic> {
         (self.needs)(plan)?;
         let text = value.to_string();
         if let Some(word) = self.word(&text) {

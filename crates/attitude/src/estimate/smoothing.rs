@@ -1,18 +1,18 @@
 //! Conditioned samples of a whole recording -> its smoothed attitudes, at the end. Pure.
 //!
 //! Apart from the smoother because that reads samples again and again, and here they come once: they are kept, with the
-//! vectors measured beside them ([`Kept`]), and a filter runs along for what the run says of turns, gaps and sensor.
+//! vectors measured beside them ([`SampleStore`]), and a filter runs along for what the run says of turns, gaps and sensor.
 
-use super::kept::{Event, Kept, Spool, SpoolError};
-use crate::aid::{Aided, Beside};
+use super::kept::{Event, SampleStore, Spool, SpoolError};
+use crate::aid::{AidedPropagator, VectorPairing};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Executor;
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
-    Beforehand, Estimate, FORCE_SCALE, FieldUnit, Learned, Looseness, Outcome, Sample, SampleModel,
-    Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
+    Estimate, Estimated, FORCE_SCALE, FieldUnit, Outcome, PriorScale, PriorSigmas, Sample,
+    SampleModel, Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
 };
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -32,7 +32,7 @@ const CHUNK: usize = 4096;
 
 /// Inputs of a smoother about a recording.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Told {
+pub(super) struct SmoothingInputs {
     /// Kind of a sample.
     pub(super) kind: SampleKind,
     /// Somebody said so.
@@ -40,27 +40,27 @@ pub(super) struct Told {
     /// Heading of the first attitude, rad; `None`: that of the smoother.
     pub(super) heading: Option<f64>,
     /// Ratio of this sensor's errors to those of the default class.
-    pub(super) looseness: Looseness,
+    pub(super) looseness: PriorScale,
     /// Standard deviation of the gyro's bias in its class, rad/s.
     pub(super) bias_sigma: f64,
     /// Range of the gyro, rad/s; 0: not known.
     pub(super) gyro_range: f64,
     /// Prior knowledge of this sensor.
-    pub(super) known: Beforehand,
+    pub(super) known: PriorSigmas,
 }
 
 /// A recording on its way to the smoother.
 #[derive(Debug)]
 pub(super) struct Smoothing {
     /// Runs along for its counts: nobody gets its attitudes.
-    aided: Aided,
+    aided: AidedPropagator,
     /// The same before the first sample.
-    fresh: Aided,
-    kept: Kept,
+    fresh: AidedPropagator,
+    kept: SampleStore,
     /// The first steps, ns, and the last stamp.
     steps: Vec<i64>,
     last: Option<Nanos>,
-    told: Told,
+    told: SmoothingInputs,
     /// Once the end has come; in words why there is none.
     result: Option<Result<Recording, Diagnostic>>,
 }
@@ -88,7 +88,7 @@ const BEYOND: f64 = 3.5;
 const LEAST_SEEN: f64 = 0.1;
 /// And is smoothed again with priors that are so many times as wide: those of one that nobody has calibrated
 /// (`uncalibrated` beside what is expected where nobody says anything).
-const LOOSER: Looseness = Looseness {
+const LOOSER: PriorScale = PriorScale {
     scale: 2.5,
     axes: 6.0,
     force: 9.8,
@@ -96,14 +96,14 @@ const LOOSER: Looseness = Looseness {
 /// Factor by which the sigmas of a calibration file are widened.
 const LOOSER_KNOWN: f64 = 2.5;
 
-fn is_beyond(smoothed: &Smoothed, looseness: Looseness) -> bool {
+fn is_beyond(smoothed: &Smoothed, looseness: PriorScale) -> bool {
     let calibration = smoothed.calibration();
     let force = own_scales(calibration.force, FORCE_SCALE * looseness.scale);
     is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&force)
 }
 
 /// Removes what the scales of all axes share, which is known of no accelerometer: each is then known to `own`.
-fn own_scales(mut force: Learned<9>, own: f64) -> Learned<9> {
+fn own_scales(mut force: Estimated<9>, own: f64) -> Estimated<9> {
     const SCALES: [usize; 3] = [0, 4, 8];
     if SCALES.iter().all(|i| force.prior[*i] > own) {
         let common = SCALES.iter().map(|i| force.value[*i]).sum::<f64>() / 3.0;
@@ -115,7 +115,7 @@ fn own_scales(mut force: Learned<9>, own: f64) -> Learned<9> {
     force
 }
 
-fn is_off<const N: usize>(learned: &Learned<N>) -> bool {
+fn is_off<const N: usize>(learned: &Estimated<N>) -> bool {
     let sigmas = learned.sigma.iter().zip(&learned.prior);
     let mut all = learned.value.iter().zip(sigmas);
     all.any(|(value, (sigma, prior))| {
@@ -126,7 +126,7 @@ fn is_off<const N: usize>(learned: &Learned<N>) -> bool {
 
 /// Kept samples, as the smoother reads them.
 struct Reading<'a> {
-    kept: &'a mut Kept,
+    kept: &'a mut SampleStore,
     has_forces_beside: bool,
     /// Rates whose attitudes have not come yet, where they are wanted.
     waiting: Option<&'a RefCell<VecDeque<RateSample>>>,
@@ -136,8 +136,8 @@ impl Samples for Reading<'_> {
     type Error = SpoolError;
 
     fn pass(&mut self, take: &mut dyn FnMut(&[Sample])) -> Result<(), SpoolError> {
-        let mut forces = self.has_forces_beside.then(Beside::default);
-        let mut fields = Beside::with_repeats();
+        let mut forces = self.has_forces_beside.then(VectorPairing::default);
+        let mut fields = VectorPairing::with_repeats();
         let (mut last, mut shift): (Option<Nanos>, i64) = (None, 0);
         let mut chunk = Vec::with_capacity(CHUNK);
         self.kept.give(|event| match event {
@@ -186,11 +186,11 @@ impl Samples for Reading<'_> {
 
 impl Smoothing {
     /// Makes one of a filter that has taken nothing yet.
-    pub(super) fn new(aided: Aided, told: Told) -> Smoothing {
+    pub(super) fn new(aided: AidedPropagator, told: SmoothingInputs) -> Smoothing {
         Smoothing {
             fresh: aided.clone(),
             aided,
-            kept: Kept::default(),
+            kept: SampleStore::default(),
             steps: Vec::new(),
             last: None,
             told,
@@ -204,7 +204,7 @@ impl Smoothing {
     }
 
     /// The filter that runs along.
-    pub(super) fn aided(&self) -> &Aided {
+    pub(super) fn aided(&self) -> &AidedPropagator {
         &self.aided
     }
 
@@ -490,12 +490,12 @@ mod tests {
         }
     }
 
-    fn aided() -> Aided {
+    fn aided() -> AidedPropagator {
         let settings = aid::Settings {
             has_field: true,
             ..aid::Settings::default()
         };
-        let aided = Aided::new(propagate::Settings::default(), settings, Start::Level);
+        let aided = AidedPropagator::new(propagate::Settings::default(), settings, Start::Level);
         aided.unwrap().with_forces_beside()
     }
 
@@ -517,14 +517,14 @@ mod tests {
     fn new() -> Smoothing {
         Smoothing::new(
             aided(),
-            Told {
+            SmoothingInputs {
                 kind: SampleKind::Rate,
                 is_kind_stated: true,
                 heading: None,
                 bias_sigma: BIAS_SIGMA,
                 gyro_range: 0.0,
-                looseness: Looseness::default(),
-                known: Beforehand::default(),
+                looseness: PriorScale::default(),
+                known: PriorSigmas::default(),
             },
         )
     }
@@ -533,7 +533,7 @@ mod tests {
     fn a_recording_kept_in_a_file_gives_the_bits_of_one_in_memory() {
         for is_smooth in [true, false] {
             let (mut held, mut spooled) = (new(), new());
-            spooled.kept = Kept::of_at_most(0);
+            spooled.kept = SampleStore::of_at_most(0);
             spooled.spool_to(Box::new(Cursor::new(Vec::new())));
             taken(&mut held, is_smooth);
             taken(&mut spooled, is_smooth);

@@ -5,7 +5,7 @@
 
 use super::first_pass::{Conditioned, FEW};
 use super::meaning::Meaning;
-use super::plan::Plan;
+use super::plan::EstimationSettings;
 use crate::condition::regularise::{Lines, Regulariser, Survey, Value};
 use crate::diagnostic::Diagnostic;
 use crate::record::{RawSample, SampleKind};
@@ -96,7 +96,7 @@ impl StampPass {
     /// the plan leaves stamps as they are.
     #[must_use]
     pub fn new(
-        plan: &Plan,
+        plan: &EstimationSettings,
         meaning: &Meaning,
         others: impl IntoIterator<Item = SampleKind>,
     ) -> Option<StampPass> {

@@ -13,12 +13,12 @@ use super::method::{LARGEST_WINDOW, Method, Order, Placement};
 use super::report::Report;
 use super::settings::{Settings, SettingsError};
 use super::turn::Turn;
-use super::window::{Plan, Step};
+use super::window::{Step, WindowKernel};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{AttitudeSample, Join, Measured, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
-use state::{Output, Waiting};
+use state::{Output, PendingSample};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -77,7 +77,7 @@ pub struct Propagator {
     engine: Engine,
     track: Track,
     /// Samples not yet output. Those that turn nothing come out with the attitude before them.
-    queue: VecDeque<Waiting>,
+    queue: VecDeque<PendingSample>,
     /// Element whose interval is integrated next.
     next: usize,
     output: Output,
@@ -93,13 +93,13 @@ pub struct Propagator {
 /// Engine that computes the steps.
 #[derive(Clone, Debug)]
 enum Engine {
-    Sliding(Arc<Plan>),
+    Sliding(Arc<WindowKernel>),
     Commit {
-        plan: Arc<Plan>,
+        plan: Arc<WindowKernel>,
         /// Whether finals are wanted.
         finals: bool,
         /// Attitudes that have come out provisionally and are to come out for good.
-        open: VecDeque<Waiting>,
+        open: VecDeque<PendingSample>,
     },
     Classical(Method),
 }
@@ -172,7 +172,7 @@ impl Propagator {
     }
 
     /// Begins as the run after one that was reset so often: the first output says [`Status::RESET`].
-    pub fn succeed(&mut self, resets: u32) {
+    pub fn continue_counts_of(&mut self, resets: u32) {
         self.output.state.resets = resets.saturating_add(1);
         self.output.state.added = self.output.state.added.with(Status::RESET);
     }
@@ -298,7 +298,7 @@ impl Propagator {
         } else {
             self.output.report.stalled += 1;
         }
-        self.queue.push_back(Waiting { sample, turns });
+        self.queue.push_back(PendingSample { sample, turns });
     }
 
     fn append(&mut self, sample: &RateSample) {
@@ -448,7 +448,7 @@ impl Propagator {
         let Engine::Commit { plan, finals, open } = &mut self.engine else {
             return;
         };
-        while let Some(Waiting { sample, turns }) = self.queue.pop_front() {
+        while let Some(PendingSample { sample, turns }) = self.queue.pop_front() {
             let newest = self.track.len() - 1;
             let rate = if turns {
                 Some(self.track.rate(newest))
@@ -484,7 +484,7 @@ impl Propagator {
             if newest >= self.next {
                 self.output.state.added = self.output.state.added.with(Status::PROVISIONAL);
                 if *finals {
-                    open.push_back(Waiting { sample, turns });
+                    open.push_back(PendingSample { sample, turns });
                 }
             }
             self.output.output_at(&sample, rate, out);
@@ -528,7 +528,7 @@ fn plan(
     placement: Placement,
     increments: bool,
     provisional: bool,
-) -> Result<Arc<Plan>, SettingsError> {
+) -> Result<Arc<WindowKernel>, SettingsError> {
     let smallest = if increments { 1 } else { 2 };
     if !(smallest..=LARGEST_WINDOW).contains(&window) {
         return Err(SettingsError::Window {
@@ -537,7 +537,7 @@ fn plan(
             largest: LARGEST_WINDOW,
         });
     }
-    Ok(Plan::shared(
+    Ok(WindowKernel::shared(
         window,
         order,
         placement,

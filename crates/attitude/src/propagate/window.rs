@@ -120,7 +120,7 @@ impl Step {
 
 /// A sliding-window method, ready to run.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct WindowKernel {
     pub(crate) window: usize,
     placement: Placement,
     /// Samples needed beyond the end of the interval.
@@ -140,9 +140,9 @@ pub(crate) struct Plan {
 type Key = (usize, Order, Placement, bool, bool);
 
 /// Plans in use: 40 kB each, which a thousand streams of one method share. No more than there are keys.
-static PLANS: LazyLock<Mutex<HashMap<Key, Weak<Plan>>>> = LazyLock::new(Mutex::default);
+static PLANS: LazyLock<Mutex<HashMap<Key, Weak<WindowKernel>>>> = LazyLock::new(Mutex::default);
 
-impl Plan {
+impl WindowKernel {
     /// The plan of every stream with this window, `provisional` ones with what those need.
     pub(crate) fn shared(
         window: usize,
@@ -157,7 +157,7 @@ impl Plan {
         if let Some(plan) = plans.get(&key).and_then(Weak::upgrade) {
             return plan;
         }
-        let plan = Plan::new(window, order, placement, increments);
+        let plan = WindowKernel::new(window, order, placement, increments);
         let plan = Arc::new(match provisional {
             true => plan.with_provisional(),
             false => plan,
@@ -186,7 +186,7 @@ impl Plan {
         if centred.is_none() {
             tables[nominal] = Some(table);
         }
-        Plan {
+        WindowKernel {
             window,
             look_ahead,
             placement,

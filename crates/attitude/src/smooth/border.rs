@@ -2,7 +2,7 @@
 //!
 //! Apart from the nodes because these are the border of the equations: every node sees them.
 
-use super::settings::{Beforehand, Looseness, Settings};
+use super::settings::{PriorScale, PriorSigmas, Settings};
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.
@@ -59,7 +59,7 @@ pub(super) const IRON_SCALE: f64 = 1.0;
 impl Priors {
     /// Makes it for a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
     pub(super) fn new(settings: &Settings, has_moving_field: bool) -> Priors {
-        let Looseness { scale, axes, force } = settings.looseness;
+        let PriorScale { scale, axes, force } = settings.looseness;
         let mut sigma = [0.0; ALL];
         let mut matrix = |first: usize, diagonal: f64, others: f64| {
             for i in 0..9 {
@@ -131,7 +131,7 @@ impl Priors {
     }
 
     /// Takes up what is known of this sensor.
-    fn narrow(&mut self, known: &Beforehand) {
+    fn narrow(&mut self, known: &PriorSigmas) {
         let mut put = |first: usize, sigmas: &[Option<f64>]| {
             if sigmas.iter().all(Option::is_none) {
                 return;

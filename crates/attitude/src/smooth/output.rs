@@ -40,13 +40,13 @@ pub struct Estimate {
 }
 
 /// Inputs that wait for their attitude.
-struct Waiting {
+struct PendingInputs {
     stamps: VecDeque<Nanos>,
     /// Place in the input of the first of them.
     first: u64,
 }
 
-impl Waiting {
+impl PendingInputs {
     fn pop(&mut self) -> Option<Nanos> {
         self.first += 1;
         self.stamps.pop_front()
@@ -64,7 +64,7 @@ impl Smoothed {
         samples: &mut S,
         mut take: impl FnMut(&[Estimate]),
     ) -> Result<Vec<Sizes>, S::Error> {
-        let waiting = RefCell::new(Waiting {
+        let waiting = RefCell::new(PendingInputs {
             stamps: VecDeque::new(),
             first: 0,
         });
@@ -212,8 +212,13 @@ impl Smoothed {
 }
 
 /// The samples that wait up to this one, and it.
-fn give(sample: &Prepared, estimate: &Estimate, queue: &mut Waiting, out: &mut Vec<Estimate>) {
-    let is_before = |queue: &Waiting| {
+fn give(
+    sample: &Prepared,
+    estimate: &Estimate,
+    queue: &mut PendingInputs,
+    out: &mut Vec<Estimate>,
+) {
+    let is_before = |queue: &PendingInputs| {
         queue.first < sample.input
             && (sample.is_input
                 || queue
@@ -238,7 +243,7 @@ fn give(sample: &Prepared, estimate: &Estimate, queue: &mut Waiting, out: &mut V
 /// Samples whose stamps are kept until their attitude comes.
 struct Watched<'a, S> {
     samples: &'a mut S,
-    waiting: &'a RefCell<Waiting>,
+    waiting: &'a RefCell<PendingInputs>,
 }
 
 impl<S: Samples> Samples for Watched<'_, S> {

@@ -68,7 +68,7 @@ impl Along {
 
 /// A bias of the gyro along an axis of the body that was held, since motion does not tell it.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Held {
+pub struct HeldBias {
     /// The axis, body, unit: nearly vertical over the whole recording.
     pub axis: Vector3<f64>,
     /// The bias along it where the recording begins, rad/s.
@@ -119,9 +119,9 @@ impl Main {
 
     /// The bias along it that was seen to be `rate` with a variance of `seen`, where it was nothing with that of
     /// `prior`.
-    fn held(&self, rate: f64, seen: f64, prior: f64, is_by_rest: bool) -> Held {
+    fn held(&self, rate: f64, seen: f64, prior: f64, is_by_rest: bool) -> HeldBias {
         let share = prior / (prior + seen);
-        Held {
+        HeldBias {
             axis: self.axis,
             rate: rate * share,
             sigma: (prior * (1.0 - share)).sqrt(),
@@ -130,7 +130,12 @@ impl Main {
     }
 
     /// Bias by rests; `None` without any. `known`: sigmas of the bias beforehand, `class`: that of the sensor's class.
-    pub(super) fn by_rests(&self, rests: &[Run], known: &Vector3<f64>, class: f64) -> Option<Held> {
+    pub(super) fn by_rests(
+        &self,
+        rests: &[Run],
+        known: &Vector3<f64>,
+        class: f64,
+    ) -> Option<HeldBias> {
         let mut rates: Vec<f64> = rests.iter().map(|run| self.axis.dot(&run.rate)).collect();
         if rates.is_empty() {
             return None;
@@ -154,7 +159,7 @@ impl Main {
         solved: Option<(&[Node], &[Marginal])>,
         filter: Option<&Realtime>,
         known: &Vector3<f64>,
-    ) -> Held {
+    ) -> HeldBias {
         let class = self.sigma(known);
         let by_leaning = match solved {
             Some(solved) => {
@@ -163,13 +168,13 @@ impl Main {
             }
             None => self.held(0.0, f64::INFINITY, class * class, false),
         };
-        let by_filter = filter.map(|filter| Held {
+        let by_filter = filter.map(|filter| HeldBias {
             rate: self.axis.dot(&filter.bias),
             sigma: self.sigma(&filter.bias_sigma),
             is_by_rest: true,
             ..by_leaning
         });
-        let is_known = |held: &Held| {
+        let is_known = |held: &HeldBias| {
             held.sigma < by_leaning.sigma.min(RESTED) && held.rate.abs() < BEYOND_CLASS * class
         };
         by_filter.filter(is_known).unwrap_or(by_leaning)
@@ -186,7 +191,7 @@ impl Main {
         segments: &[Segment],
         (nodes, marginals): (&[Node], &[Marginal]),
         mut prior: f64,
-    ) -> Held {
+    ) -> HeldBias {
         let (mut sum, mut secs) = (0.0, 0.0);
         for (segment, pair) in segments.iter().zip(nodes.windows(2)) {
             sum += 0.5 * self.axis.dot(&(pair[0].bias + pair[1].bias)) * segment.secs;
@@ -207,7 +212,7 @@ impl Main {
     }
 }
 
-impl Held {
+impl HeldBias {
     /// A bias with this along the axis.
     pub(super) fn put_in(&self, bias: &Vector3<f64>) -> Vector3<f64> {
         bias + self.axis * (self.rate - self.axis.dot(bias))

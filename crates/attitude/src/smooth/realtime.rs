@@ -9,7 +9,7 @@ use super::sample::Samples;
 use super::segments::{Segment, median_of};
 use super::settings::{BIAS_SIGMA, Settings};
 use super::survey::Survey;
-use crate::aid::{self, Aided};
+use crate::aid::{self, AidedPropagator};
 use crate::frames::In;
 use crate::propagate;
 use crate::quaternion::BodyRate;
@@ -83,7 +83,7 @@ fn pass<S: Samples>(
         kind: SampleKind::DeltaAngle,
         ..propagate::Settings::default()
     };
-    let Ok(mut aided) = Aided::new(propagation, settings, aid::Start::Level) else {
+    let Ok(mut aided) = AidedPropagator::new(propagation, settings, aid::Start::Level) else {
         return Ok(None);
     };
     let mut out: Vec<AttitudeSample> = Vec::new();

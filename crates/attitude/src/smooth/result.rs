@@ -11,7 +11,7 @@ pub(crate) const OBSERVED: f64 = 0.7;
 
 /// Some numbers that were learned, each with one standard deviation after and before.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Learned<const N: usize> {
+pub struct Estimated<const N: usize> {
     /// The numbers; matrices row by row.
     pub value: [f64; N],
     /// One standard deviation, by this log.
@@ -20,7 +20,7 @@ pub struct Learned<const N: usize> {
     pub prior: [f64; N],
 }
 
-impl<const N: usize> Learned<N> {
+impl<const N: usize> Estimated<N> {
     /// Whether this log says more of the number `i` than was known before.
     #[must_use]
     pub fn is_observed(&self, i: usize) -> bool {
@@ -30,8 +30,13 @@ impl<const N: usize> Learned<N> {
         }
     }
 
-    fn of(first: usize, constants: &Constants, sigma: &Constants, prior: &Constants) -> Learned<N> {
-        Learned {
+    fn of(
+        first: usize,
+        constants: &Constants,
+        sigma: &Constants,
+        prior: &Constants,
+    ) -> Estimated<N> {
+        Estimated {
             value: std::array::from_fn(|i| constants[first + i]),
             sigma: std::array::from_fn(|i| sigma[first + i]),
             prior: std::array::from_fn(|i| prior[first + i]),
@@ -43,13 +48,13 @@ impl<const N: usize> Learned<N> {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Calibration {
     /// G of `rate = (1 + G)(measured - bias)`.
-    pub gyro: Learned<9>,
+    pub gyro: Estimated<9>,
     /// ba of `force = (1 + A)(measured - ba)`, m/s^2.
-    pub force_bias: Learned<3>,
+    pub force_bias: Estimated<3>,
     /// A.
-    pub force: Learned<9>,
+    pub force: Estimated<9>,
     /// ta of `force + ta rate x force`, s.
-    pub force_time: Learned<1>,
+    pub force_time: Estimated<1>,
     /// Magnetometer, with a field.
     pub magnetometer: Option<Magnetometer>,
 }
@@ -58,15 +63,15 @@ pub struct Calibration {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Magnetometer {
     /// h of `field = (1 + S)(measured - h)`, uT.
-    pub hard_iron: Learned<3>,
+    pub hard_iron: Estimated<3>,
     /// S.
-    pub matrix: Learned<9>,
+    pub matrix: Estimated<9>,
     /// tm of `field + tm rate x field`, s.
-    pub time: Learned<1>,
+    pub time: Estimated<1>,
     /// The field's north and up, uT.
-    pub north_up: Learned<2>,
+    pub north_up: Estimated<2>,
     /// Field added while the body moves: east, north, up, uT.
-    pub while_moving: Learned<3>,
+    pub while_moving: Estimated<3>,
     /// uT by the unit of the field that came.
     pub scale: f64,
 }
@@ -94,16 +99,16 @@ impl Calibration {
         prior[border::IRON..border::FIELD].fill(IRON_SCALE.hypot(square.sqrt()));
         let has_field = covariance.len() > border::PLAIN;
         Calibration {
-            gyro: Learned::of(border::GYRO, constants, &sigma, &prior),
-            force_bias: Learned::of(border::FORCE_BIAS, constants, &sigma, &prior),
-            force: Learned::of(border::FORCE, constants, &sigma, &prior),
-            force_time: Learned::of(border::FORCE_TIME, constants, &sigma, &prior),
+            gyro: Estimated::of(border::GYRO, constants, &sigma, &prior),
+            force_bias: Estimated::of(border::FORCE_BIAS, constants, &sigma, &prior),
+            force: Estimated::of(border::FORCE, constants, &sigma, &prior),
+            force_time: Estimated::of(border::FORCE_TIME, constants, &sigma, &prior),
             magnetometer: has_field.then(|| Magnetometer {
-                hard_iron: Learned::of(border::IRON, constants, &sigma, &prior),
-                matrix: Learned::of(border::FIELD, constants, &sigma, &prior),
-                time: Learned::of(border::FIELD_TIME, constants, &sigma, &prior),
-                north_up: Learned::of(border::NORTH, constants, &sigma, &prior),
-                while_moving: Learned::of(border::MOVING, constants, &sigma, &prior),
+                hard_iron: Estimated::of(border::IRON, constants, &sigma, &prior),
+                matrix: Estimated::of(border::FIELD, constants, &sigma, &prior),
+                time: Estimated::of(border::FIELD_TIME, constants, &sigma, &prior),
+                north_up: Estimated::of(border::NORTH, constants, &sigma, &prior),
+                while_moving: Estimated::of(border::MOVING, constants, &sigma, &prior),
                 scale,
             }),
         }

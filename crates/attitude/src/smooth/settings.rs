@@ -50,7 +50,7 @@ pub enum FieldUnit {
 /// Prior knowledge of a sensor of which a calibration was taken out of the samples already: one standard deviation of
 /// what is left, body axes, matrices row by row. `None`: as of any sensor.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Beforehand {
+pub struct PriorSigmas {
     /// Sigma of the gyro's bias, rad/s.
     pub gyro_bias: [Option<f64>; 3],
     /// Sigmas of the gyro's scale and axes.
@@ -67,10 +67,10 @@ pub struct Beforehand {
     pub field_time: Option<(f64, f64)>,
 }
 
-impl Beforehand {
+impl PriorSigmas {
     /// The same, known so many times worse.
     #[must_use]
-    pub fn widened(mut self, by: f64) -> Beforehand {
+    pub fn widened(mut self, by: f64) -> PriorSigmas {
         let gyro = self.gyro_bias.iter_mut().chain(&mut self.gyro);
         let force = self.force_bias.iter_mut().chain(&mut self.force);
         for sigma in gyro.chain(force).chain(&mut self.field) {
@@ -85,7 +85,7 @@ impl Beforehand {
 
 /// Ratio of the priors to those after a calibration in the factory.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Looseness {
+pub struct PriorScale {
     /// Ratio for scales, and for when forces and fields are measured.
     pub scale: f64,
     /// Ratio for axes, to each other and in the case.
@@ -94,9 +94,9 @@ pub struct Looseness {
     pub force: f64,
 }
 
-impl Default for Looseness {
-    fn default() -> Looseness {
-        Looseness {
+impl Default for PriorScale {
+    fn default() -> PriorScale {
+        PriorScale {
             scale: 1.0,
             axes: 1.0,
             force: 1.0,
@@ -104,9 +104,9 @@ impl Default for Looseness {
     }
 }
 
-impl Looseness {
-    pub(crate) fn times(self, by: Looseness) -> Looseness {
-        Looseness {
+impl PriorScale {
+    pub(crate) fn times(self, by: PriorScale) -> PriorScale {
+        PriorScale {
             scale: self.scale * by.scale,
             axes: self.axes * by.axes,
             force: self.force * by.force,
@@ -125,9 +125,9 @@ pub struct Settings {
     /// Range of the gyro, rad/s: a rate at it may be any beyond. 0: not known.
     pub gyro_range: f64,
     /// Ratio of the sigmas of calibration constants to those after a calibration in the factory.
-    pub looseness: Looseness,
+    pub looseness: PriorScale,
     /// Prior knowledge of this sensor.
-    pub known: Beforehand,
+    pub known: PriorSigmas,
     /// Delay of the samples, s: attitudes are turned on by the rate over this.
     pub sensor_delay: f64,
     /// Reference of the heading in the field.
@@ -156,8 +156,8 @@ impl Default for Settings {
             node_spacing: None,
             bias_sigma: BIAS_SIGMA,
             gyro_range: 0.0,
-            looseness: Looseness::default(),
-            known: Beforehand::default(),
+            looseness: PriorScale::default(),
+            known: PriorSigmas::default(),
             sensor_delay: 0.0,
             heading_reference: HeadingReference::Standstill,
             field_unit: FieldUnit::Microtesla,
@@ -181,7 +181,7 @@ impl Settings {
         if !in_range(spacing, 0.05, 60.0) {
             return Some(("node_spacing", spacing));
         }
-        let Looseness { scale, axes, force } = self.looseness;
+        let PriorScale { scale, axes, force } = self.looseness;
         for looseness in [scale, axes, force] {
             if !in_range(looseness, 1e-3, 1e3) {
                 return Some(("looseness", looseness));

@@ -4,7 +4,7 @@
 
 use super::border::Constants;
 use super::factors::Node;
-use super::planar::Held;
+use super::planar::HeldBias;
 use super::result::{Bias, Calibration, Counts, Outcome, Section};
 use super::segments::Segment;
 use super::settings::Settings;
@@ -34,7 +34,7 @@ pub struct Smoothed {
     pub(super) outcome: Outcome,
     pub(super) calibration: Calibration,
     pub(super) bound: [f64; 2],
-    pub(super) held: Option<Held>,
+    pub(super) held: Option<HeldBias>,
     pub(super) counts: Counts,
 }
 
@@ -66,7 +66,7 @@ impl Smoothed {
     /// The bias that was held, where motion does not tell it: one axis of the body stays vertical, and no field tells
     /// the heading.
     #[must_use]
-    pub fn held(&self) -> Option<Held> {
+    pub fn held(&self) -> Option<HeldBias> {
         self.held
     }
 

@@ -9,7 +9,7 @@ use super::heading::{FieldTrust, sections, turn_north};
 use super::motion::Bound;
 use super::pass::by_segment;
 use super::phase::{Failure, Phase, Problem, State, run};
-use super::planar::{Along, Held, Main, headed};
+use super::planar::{Along, HeldBias, Main, headed};
 use super::prepare::Preparer;
 use super::prepared::Prepared;
 use super::realtime::{self, Realtime};
@@ -107,7 +107,7 @@ struct Solved {
     marginals: Vec<Marginal>,
     outcome: Outcome,
     iterations: [u64; 2],
-    held: Option<Held>,
+    held: Option<HeldBias>,
 }
 
 impl Solved {
@@ -173,7 +173,7 @@ impl Work {
                 }
             }
         }
-        let mut best: Option<(Problem<'_>, State, Phase<NARROW>, Option<Held>)> = None;
+        let mut best: Option<(Problem<'_>, State, Phase<NARROW>, Option<HeldBias>)> = None;
         let rests = rests(&self.segments);
         let mut main = None;
         for (bias, nodes) in starts {
@@ -278,7 +278,7 @@ impl Work {
         &self,
         samples: &mut S,
         problem: &Problem<'_>,
-        (mut state, held): (State, Option<Held>),
+        (mut state, held): (State, Option<HeldBias>),
         plain: Phase<NARROW>,
     ) -> Result<Result<Solved, Failure>, S::Error> {
         let mut iterations = [plain.iterations as u64, 0];

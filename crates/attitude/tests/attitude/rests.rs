@@ -2,8 +2,8 @@
 
 use nalgebra::{Rotation3, Vector3};
 use strapd_attitude::estimate::{
-    Aid, Bias, Estimator, Meaning, NOISE_PRESETS, Noise, Patience, Plan, Preparation, Prepared,
-    at_once,
+    Aid, Bias, EstimationSettings, Estimator, Meaning, NOISE_PRESETS, Noise, Patience, Preparation,
+    Prepared, at_once,
 };
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::BodyRate;
@@ -91,15 +91,15 @@ impl<'a> Body<'a> {
 }
 
 /// A plan as the command has it where nobody says more.
-fn default() -> Plan {
-    Plan {
+fn default() -> EstimationSettings {
+    EstimationSettings {
         aid: Aid::Auto,
         kind: Some(SampleKind::Average),
-        ..Plan::default()
+        ..EstimationSettings::default()
     }
 }
 
-fn prepared(plan: &Plan, samples: &[RawSample], patience: Patience) -> Prepared {
+fn prepared(plan: &EstimationSettings, samples: &[RawSample], patience: Patience) -> Prepared {
     let meaning = Meaning::new(plan, &Declared::default());
     let mut preparation = Preparation::new(plan, &meaning, patience);
     for sample in samples {
@@ -122,7 +122,7 @@ struct Seen {
     sigma: f64,
 }
 
-fn seen(plan: &Plan, body: &Body<'_>) -> Seen {
+fn seen(plan: &EstimationSettings, body: &Body<'_>) -> Seen {
     let (samples, truth) = body.log();
     let prepared = prepared(plan, &samples, Patience::WholeLog);
     let meaning = Meaning::new(plan, &Declared::default());
@@ -199,7 +199,7 @@ fn the_rest_of_a_file_is_its_bias_wherever_it_is() {
         );
         let left = by_rest.prepared.aiding.unwrap().settings.bias_prior / DEG;
         assert!((0.14..0.17).contains(&left), "{what} {left}");
-        let none = Plan {
+        let none = EstimationSettings {
             bias: Bias::None,
             ..default()
         };
@@ -226,11 +226,11 @@ fn what_cannot_be_read_twice_and_what_was_said_are_as_they_were() {
     let stream = prepared(&default(), &samples, Patience::FirstMinute);
     let meaning = Meaning::new(&default(), &Declared::default());
     let live = at_once(&default(), &meaning, &samples[..1]).unwrap();
-    let daemon = Plan {
+    let daemon = EstimationSettings {
         method: Method::COMMIT,
         ..default()
     };
-    let alone = Plan {
+    let alone = EstimationSettings {
         aid: Aid::None,
         ..default()
     };
@@ -242,7 +242,7 @@ fn what_cannot_be_read_twice_and_what_was_said_are_as_they_were() {
         );
         assert_eq!(prepared.bias_left, None);
     }
-    let given = Plan {
+    let given = EstimationSettings {
         bias: Bias::Given(BodyRate(Vector3::x() * 0.01)),
         ..default()
     };
@@ -251,7 +251,7 @@ fn what_cannot_be_read_twice_and_what_was_said_are_as_they_were() {
         "as given"
     );
     // A class that knows it better than a rest does.
-    let tactical = Plan {
+    let tactical = EstimationSettings {
         noise: Noise::preset(&NOISE_PRESETS[3]),
         ..default()
     };
@@ -289,7 +289,7 @@ fn a_turntable_is_no_rest() {
         table.bias
     );
     // Who says so has it taken for the bias, and reads that it may be none.
-    let said = Plan {
+    let said = EstimationSettings {
         bias: Bias::Auto,
         ..default()
     };
@@ -316,7 +316,7 @@ fn a_turntable_as_slow_as_a_bias_is_no_rest_by_its_direction() {
         table.sigma
     );
     // The filter by itself, of a stream or with the bias left in, learns nothing of it either.
-    let none = Plan {
+    let none = EstimationSettings {
         bias: Bias::None,
         ..default()
     };
@@ -359,7 +359,7 @@ fn a_bias_along_the_vertical_of_a_body_that_moves_later_is_a_bias() {
         rest.prepared.warnings
     );
     // A filter that has not read ahead learns it when the body has come back to rest.
-    let none = Plan {
+    let none = EstimationSettings {
         bias: Bias::None,
         ..default()
     };
@@ -396,7 +396,7 @@ fn a_steady_turn_about_another_axis_takes_gravity_along() {
         );
         // Nor for who asks for the bias of a rest.
         let (samples, _) = body.log();
-        let said = Plan {
+        let said = EstimationSettings {
             bias: Bias::Auto,
             ..default()
         };
@@ -525,7 +525,7 @@ fn an_accelerometer_that_reads_too_little_and_half_a_second_are_no_obstacle() {
 }
 
 /// Tilt of the first attitude of a shaken body whose forces come apart from its rates, degrees off the truth.
-fn first_tilt(plan: &Plan, read_ahead: bool) -> f64 {
+fn first_tilt(plan: &EstimationSettings, read_ahead: bool) -> f64 {
     let motion = |t: f64| {
         (
             Vector3::x() * (0.5 * (2.0 * t).sin()),
@@ -569,7 +569,7 @@ fn first_tilt(plan: &Plan, read_ahead: bool) -> f64 {
 
 #[test]
 fn forces_of_their_own_level_a_file_by_their_mean() {
-    let plan = Plan {
+    let plan = EstimationSettings {
         has_forces_beside: true,
         ..default()
     };

@@ -6,26 +6,28 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::settings::{
     Default, ROWS, Row, Takes, Value, defaults, named, row, with,
 };
-use strapd_attitude::estimate::{Aid, CLASS_BY_DATA, NOISE_PRESETS, Plan, SensorCalibration};
+use strapd_attitude::estimate::{
+    Aid, CLASS_BY_DATA, EstimationSettings, NOISE_PRESETS, SensorCalibration,
+};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::setting;
 use strapd_attitude::worlds::World;
 
-fn shown(plan: &Plan) -> String {
+fn shown(plan: &EstimationSettings) -> String {
     format!("{plan:?}")
 }
 
 /// A plan with which every setting goes: a clock that has a rate, a method that has a window.
-fn open() -> Plan {
-    Plan {
+fn open() -> EstimationSettings {
+    EstimationSettings {
         clock: Clock::Index { rate_hz: 100.0 },
         method: Method::MAGNUS,
         ..defaults()
     }
 }
 
-fn put(plan: &mut Plan, given: &[(&str, &str)]) -> Result<(), Diagnostic> {
+fn put(plan: &mut EstimationSettings, given: &[(&str, &str)]) -> Result<(), Diagnostic> {
     for row in &ROWS {
         for (_, text) in given.iter().filter(|(name, _)| *name == row.name()) {
             row.apply(plan, &Value::Text(text))?;
@@ -124,7 +126,10 @@ fn words_are_the_names_of_what_they_set_and_none_is_left_out() {
     }
     // The last is told by the data.
     assert_eq!(words("noise").count(), NOISE_PRESETS.len() + 1);
-    assert_eq!(plan("noise", CLASS_BY_DATA).noise, Plan::default().noise);
+    assert_eq!(
+        plan("noise", CLASS_BY_DATA).noise,
+        EstimationSettings::default().noise
+    );
     assert_eq!(plan("aid", "gravity+mag").aid, Aid::GravityAndField);
 }
 

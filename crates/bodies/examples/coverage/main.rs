@@ -18,7 +18,7 @@ mod score;
 use log::Log;
 use score::{Score, score};
 use strapd_attitude::estimate::{
-    Aid, Bias, Estimator, Initial, Meaning, Noise, Patience, Plan, Preparation,
+    Aid, Bias, EstimationSettings, Estimator, Initial, Meaning, Noise, Patience, Preparation,
 };
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{Declared, SampleKind};
@@ -28,12 +28,12 @@ type Failure = Box<dyn std::error::Error>;
 /// Estimators by name; any may have a class behind a colon, `smooth:uncalibrated`.
 const ESTIMATORS: [&str; 5] = ["gyro", "default", "field", "smooth", "smooth_field"];
 
-fn plan(name: &str) -> Result<Plan, Failure> {
+fn plan(name: &str) -> Result<EstimationSettings, Failure> {
     let (name, class) = name.split_once(':').unwrap_or((name, ""));
-    let mut plan = Plan {
+    let mut plan = EstimationSettings {
         kind: Some(SampleKind::Average),
         aid: Aid::Gravity,
-        ..Plan::default()
+        ..EstimationSettings::default()
     };
     match name {
         "gyro" => {
@@ -57,7 +57,7 @@ fn plan(name: &str) -> Result<Plan, Failure> {
 }
 
 /// Attitudes of a log by a plan, and their score; what was noticed, in words.
-fn run(plan: &Plan, log: &Log) -> Result<(Score, String), Failure> {
+fn run(plan: &EstimationSettings, log: &Log) -> Result<(Score, String), Failure> {
     let meaning = Meaning::new(plan, &Declared::default());
     let mut preparation = Preparation::new(plan, &meaning, Patience::WholeLog);
     for sample in &log.samples {

@@ -21,7 +21,7 @@ use super::stamp::Bare;
 use super::{Decoded, MAX_BATCH, Options, Undecodable, Wanted};
 use crate::text::printable;
 use find::Seeker;
-use found::{Found, Instant, StampRule};
+use found::{Instant, ObjectFields, StampRule};
 use scan::Scanner;
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
@@ -29,7 +29,7 @@ use trie::Trie;
 
 /// Plan of what is looked for in the messages of a channel.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Plan {
+pub(crate) struct Program {
     /// The paths of `--field`.
     pub(crate) trie: Trie,
     pub(crate) px4: Option<Px4>,
@@ -48,9 +48,9 @@ pub(crate) struct Plan {
     pub(crate) takes_besides: bool,
 }
 
-impl Plan {
+impl Program {
     pub(crate) fn compile(type_name: &str, options: &Options) -> Self {
-        Plan {
+        Program {
             trie: Trie::new(&options.fields),
             px4: px4(type_name),
             wanted: options.wanted,
@@ -92,7 +92,7 @@ impl Plan {
     /// Pushes the samples of what was found, bare stamps by their magnitude.
     fn push_by_magnitude(
         &self,
-        found: &Found<'_>,
+        found: &ObjectFields<'_>,
         log: Nanos,
         publish: Nanos,
         out: &mut Vec<RawSample>,
@@ -125,7 +125,7 @@ impl Plan {
     }
 
     /// Everything one payload holds.
-    pub(crate) fn find<'a>(&'a self, payload: &'a [u8]) -> Result<Found<'a>, Undecodable> {
+    pub(crate) fn find<'a>(&'a self, payload: &'a [u8]) -> Result<ObjectFields<'a>, Undecodable> {
         Seeker::new(self, Scanner::new(payload)?).message()
     }
 
@@ -133,7 +133,7 @@ impl Plan {
     /// number stands at their place in `bare`.
     pub(crate) fn push(
         &self,
-        found: &Found<'_>,
+        found: &ObjectFields<'_>,
         log: Nanos,
         publish: Nanos,
         out: &mut Vec<RawSample>,
@@ -146,7 +146,7 @@ impl Plan {
     pub(crate) fn push_in(
         &self,
         settled: Option<TimeUnit>,
-        found: &Found<'_>,
+        found: &ObjectFields<'_>,
         log: Nanos,
         publish: Nanos,
         out: &mut Vec<RawSample>,
@@ -164,7 +164,7 @@ impl Plan {
                 None
             }
         };
-        let is_beside = |found: &Found<'_>| self.takes_besides && found.is_beside();
+        let is_beside = |found: &ObjectFields<'_>| self.takes_besides && found.is_beside();
         if found.has_gyro() || found.batch.is_empty() {
             let header = stamped(0, header);
             out.push(RawSample {

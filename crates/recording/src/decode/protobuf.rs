@@ -17,7 +17,7 @@ use wire::{Broken, Reader, Value};
 
 /// A message type as a tree of what is wanted of it; the root is node 0.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Plan {
+pub(crate) struct Program {
     nodes: Vec<Node>,
     /// Form as compiled; what a message taught of it is the caller's.
     form: Form,
@@ -65,7 +65,7 @@ enum Action {
 const MAX_COUNTERS: usize = 8;
 
 struct Walk<'a, 'o> {
-    plan: &'a Plan,
+    plan: &'a Program,
     form: &'a Form,
     registers: Registers,
     counters: [u32; MAX_COUNTERS],
@@ -78,7 +78,7 @@ struct Walk<'a, 'o> {
     out: &'o mut Vec<RawSample>,
 }
 
-impl Plan {
+impl Program {
     /// Reads one payload, its registers as `form` says; pushes nothing when it fails.
     pub(crate) fn decode(
         &self,

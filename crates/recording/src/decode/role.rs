@@ -4,7 +4,7 @@
 //! answer for those it cannot decode as well.
 
 use super::schema::last_name;
-use super::select::Found;
+use super::select::MatchQuality;
 use super::{Channel, Decoder, Options, Stated, Unsupported};
 use strapd_attitude::record::Nanos;
 
@@ -85,7 +85,7 @@ fn is_spare(topic: &str) -> bool {
         .is_some_and(|n: u8| n > 0)
 }
 
-fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
+fn rank(channel: &Channel<'_>, found: MatchQuality, stated: &Stated) -> Rank {
     let name = last_name(channel.schema_name)
         .to_ascii_lowercase()
         .replace('_', "");
@@ -98,9 +98,9 @@ fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
         return Rank::ByNameOnly;
     }
     match found {
-        Found::Nothing => Rank::ByNameOnly,
-        Found::Given => Rank::Imu,
-        Found::Named => match name.as_str() {
+        MatchQuality::Nothing => Rank::ByNameOnly,
+        MatchQuality::Given => Rank::Imu,
+        MatchQuality::Named => match name.as_str() {
             _ if topic.contains("groundtruth") => Rank::ByNameOnly,
             "vehicleimu" if !is_spare(&topic) => Rank::Processed,
             "vehicleimu" | "vehicleangularvelocity" | "vehicleodometry" => Rank::RateByTopic,
@@ -111,9 +111,9 @@ fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
             _ => Rank::Imu,
         },
         // Several twists in a message are several bodies.
-        Found::Twist if stated.batched => Rank::ByNameOnly,
-        Found::Twist => Rank::Weak,
-        Found::Vector => {
+        MatchQuality::Twist if stated.batched => Rank::ByNameOnly,
+        MatchQuality::Twist => Rank::Weak,
+        MatchQuality::Vector => {
             let rate = has(&[
                 "gyro",
                 "angular_vel",

@@ -28,7 +28,7 @@ impl Decoder {
     #[must_use]
     pub fn orientation_covariance(&self, payload: &[u8]) -> Option<[f64; 9]> {
         match &self.plan {
-            super::Plan::Ros(plan) if plan.imu => imu::orientation_covariance(payload, plan.cdr),
+            super::Program::Ros(plan) if plan.imu => imu::orientation_covariance(payload, plan.cdr),
             _ => None,
         }
     }
@@ -36,7 +36,7 @@ impl Decoder {
 
 /// A message type as steps over its bytes.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Plan {
+pub(crate) struct Program {
     ops: Vec<Op>,
     reads: Vec<Read>,
     marks: Vec<Mark>,
@@ -123,7 +123,7 @@ enum Fault {
 
 /// One walk through one payload.
 struct Walk<'a, 'o> {
-    plan: &'a Plan,
+    plan: &'a Program,
     form: &'a Form,
     /// The payload without its encapsulation.
     data: &'a [u8],
@@ -137,7 +137,7 @@ struct Walk<'a, 'o> {
     out: &'o mut Vec<RawSample>,
 }
 
-impl Plan {
+impl Program {
     /// Reads one payload, its registers as `form` says; pushes nothing when it fails.
     pub(crate) fn decode(
         &self,
@@ -168,7 +168,7 @@ impl Plan {
     /// The same plan, on the short way where its layout has one.
     pub(crate) fn recognised(self) -> Self {
         let imu = imu::is_imu(&self);
-        Plan { imu, ..self }
+        Program { imu, ..self }
     }
 
     /// Form by which registers become samples.

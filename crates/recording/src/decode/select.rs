@@ -17,7 +17,7 @@ use strapd_attitude::record::TimeUnit;
 
 /// One step from a struct towards a number.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
-pub(crate) enum Step {
+pub(crate) enum PathStep {
     /// The field of this index.
     Field(usize),
     /// Element of an array.
@@ -29,7 +29,7 @@ pub(crate) enum Step {
 /// A number to read, and where it goes.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Pick {
-    pub(crate) path: Vec<Step>,
+    pub(crate) path: Vec<PathStep>,
     pub(crate) slot: Slot,
 }
 
@@ -43,15 +43,15 @@ pub(crate) struct Selection {
     /// The array whose elements are samples.
     pub(crate) batch: Option<Batch>,
     /// The string that names the frame.
-    pub(crate) frame: Option<Vec<Step>>,
+    pub(crate) frame: Option<Vec<PathStep>>,
     /// The string `child_frame_id` inside the batch.
-    pub(crate) child: Option<Vec<Step>>,
+    pub(crate) child: Option<Vec<PathStep>>,
     pub(crate) kind: Option<SampleKind>,
     pub(crate) unit: Option<GyroUnit>,
     /// Type of the struct that holds the body rate.
     pub(crate) holder: String,
     /// Way in which the body rate was found; higher is weaker.
-    pub(crate) found: Found,
+    pub(crate) found: MatchQuality,
     /// Path of the interval.
     pub(crate) interval: String,
     /// Paths of stamps, the one to be taken first.
@@ -64,14 +64,14 @@ pub(crate) struct Selection {
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Batch {
     /// The way to the array.
-    pub(crate) path: Vec<Step>,
-    /// [`Step::Each`]: one sample per element; [`Step::At`]: only this element.
-    pub(crate) element: Step,
+    pub(crate) path: Vec<PathStep>,
+    /// [`PathStep::Each`]: one sample per element; [`PathStep::At`]: only this element.
+    pub(crate) element: PathStep,
 }
 
 /// Certainty that the three numbers are an IMU's body rate.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
-pub(crate) enum Found {
+pub(crate) enum MatchQuality {
     /// Absence of a body rate.
     #[default]
     Nothing,
@@ -91,7 +91,7 @@ impl Selection {
         (0..n).all(|i| self.picks.iter().any(|p| p.slot == slot.plus(i)))
     }
 
-    pub(crate) fn take(&mut self, paths: Vec<Vec<Step>>, slot: Slot) {
+    pub(crate) fn take(&mut self, paths: Vec<Vec<PathStep>>, slot: Slot) {
         for (n, path) in (0_u8..).zip(paths) {
             self.picks.push(Pick {
                 path,
@@ -101,7 +101,7 @@ impl Selection {
     }
 
     /// Says which field was taken, for [`super::Stated::description`].
-    pub(crate) fn describe(&mut self, role: FieldRole, schema: &Schema, path: &[Step]) {
+    pub(crate) fn describe(&mut self, role: FieldRole, schema: &Schema, path: &[PathStep]) {
         self.description
             .push(format!("{} {}", role.name(), path_text(schema, path)));
     }
@@ -177,7 +177,7 @@ fn take_given(
     };
     selection.take(paths.ok_or_else(|| nowhere(&field.text))?, slot);
     if field.role == wanted.vector().0 {
-        selection.found = Found::Given;
+        selection.found = MatchQuality::Given;
     }
     if matches!(field.role, FieldRole::Gyro | FieldRole::Orientation) && selection.batch.is_none() {
         selection.batch = batch_of(schema, &first.0);
@@ -193,7 +193,7 @@ fn take_given(
 fn take_stamp(
     schema: &Schema,
     field: &FieldPath,
-    ends: &[(Vec<Step>, End)],
+    ends: &[(Vec<PathStep>, End)],
     selection: &mut Selection,
     nowhere: &dyn Fn(&str) -> String,
 ) -> Result<(), String> {
@@ -240,7 +240,7 @@ impl From<&Field> for End {
     }
 }
 
-fn resolve(schema: &Schema, path: &[Segment]) -> Option<(Vec<Step>, End)> {
+fn resolve(schema: &Schema, path: &[Segment]) -> Option<(Vec<PathStep>, End)> {
     let mut end = End {
         kind: Kind::Struct(schema.root),
         many: Many::One,
@@ -251,7 +251,7 @@ fn resolve(schema: &Schema, path: &[Segment]) -> Option<(Vec<Step>, End)> {
         match segment {
             Segment::Name(name) => {
                 let index = end.structure(schema)?.position(name)?;
-                steps.push(Step::Field(index));
+                steps.push(PathStep::Field(index));
                 end = End::from(end.structure(schema)?.fields.get(index)?);
             }
             Segment::At(n) => {
@@ -260,7 +260,7 @@ fn resolve(schema: &Schema, path: &[Segment]) -> Option<(Vec<Step>, End)> {
                     Many::Sequence => {}
                     _ => return None,
                 }
-                steps.push(Step::At(*n));
+                steps.push(PathStep::At(*n));
                 end.many = Many::One;
             }
             Segment::Each => {
@@ -268,7 +268,7 @@ fn resolve(schema: &Schema, path: &[Segment]) -> Option<(Vec<Step>, End)> {
                 if end.many == Many::One || eaches > 1 {
                     return None;
                 }
-                steps.push(Step::Each);
+                steps.push(PathStep::Each);
                 end.many = Many::One;
             }
         }
@@ -277,16 +277,18 @@ fn resolve(schema: &Schema, path: &[Segment]) -> Option<(Vec<Step>, End)> {
 }
 
 /// The array of structs that a path goes through.
-pub(crate) fn batch_of(schema: &Schema, path: &[Step]) -> Option<Batch> {
+pub(crate) fn batch_of(schema: &Schema, path: &[PathStep]) -> Option<Batch> {
     let mut at = schema.root;
     let mut steps = path.iter().enumerate().peekable();
     while let Some((_, step)) = steps.next() {
-        let Step::Field(index) = step else { continue };
+        let PathStep::Field(index) = step else {
+            continue;
+        };
         let Kind::Struct(next) = schema.get(at)?.fields.get(*index)?.kind else {
             return None;
         };
         at = next;
-        if let Some((n, element @ (Step::Each | Step::At(_)))) = steps.peek() {
+        if let Some((n, element @ (PathStep::Each | PathStep::At(_)))) = steps.peek() {
             return Some(Batch {
                 path: path.get(..*n)?.to_vec(),
                 element: **element,
@@ -297,12 +299,12 @@ pub(crate) fn batch_of(schema: &Schema, path: &[Step]) -> Option<Batch> {
 }
 
 /// A path in the notation of `--field`.
-pub(crate) fn path_text(schema: &Schema, path: &[Step]) -> String {
+pub(crate) fn path_text(schema: &Schema, path: &[PathStep]) -> String {
     let mut text = String::new();
     let mut at = Some(schema.root);
     for step in path {
         match step {
-            Step::Field(index) => {
+            PathStep::Field(index) => {
                 let field = at
                     .and_then(|s| schema.get(s))
                     .and_then(|s| s.fields.get(*index));
@@ -315,8 +317,8 @@ pub(crate) fn path_text(schema: &Schema, path: &[Step]) -> String {
                     _ => None,
                 };
             }
-            Step::At(n) => text.push_str(&format!("[{n}]")),
-            Step::Each => text.push_str("[]"),
+            PathStep::At(n) => text.push_str(&format!("[{n}]")),
+            PathStep::Each => text.push_str("[]"),
         }
     }
     text
@@ -325,7 +327,7 @@ pub(crate) fn path_text(schema: &Schema, path: &[Step]) -> String {
 /// A stamp that was found.
 pub(crate) struct StampFields {
     pub(crate) form: StampForm,
-    pub(crate) paths: Vec<(Vec<Step>, Slot)>,
+    pub(crate) paths: Vec<(Vec<PathStep>, Slot)>,
 }
 
 /// The unit a stamp of a PX4 message has, whatever its name says.

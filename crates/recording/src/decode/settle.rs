@@ -6,9 +6,9 @@
 
 use super::json;
 use super::registers::{Form, StampForm};
-use super::select::Found;
-use super::stamp::{Ambiguous, Bare, MOST_WAITING, Told, unit_in_log};
-use super::{Decoder, FieldRole, Plan, Unsupported, Wanted, nothing_wanted, unsupported};
+use super::select::MatchQuality;
+use super::stamp::{Ambiguous, Bare, MOST_WAITING, UnitEvidence, unit_in_log};
+use super::{Decoder, FieldRole, Program, Unsupported, Wanted, nothing_wanted, unsupported};
 use crate::text::printable;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::record::TimeUnit;
@@ -23,7 +23,7 @@ impl Decoder {
     /// [`Unsupported`] when a JSON message lacks a `--field` path, or holds neither body rate nor
     /// orientation; it lists the keys there are. A message that cannot be decoded is no error here.
     pub fn settle(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
-        if let Plan::Json(_) = &self.plan {
+        if let Program::Json(_) = &self.plan {
             return self.settle_json(payload, log);
         }
         let bare = self.bare_numbers(payload).first().copied();
@@ -57,11 +57,11 @@ impl Decoder {
             .filter(|(_, bare)| !bare.is_empty())
             .collect();
         match unit_in_log(&numbers, MOST_WAITING + 1) {
-            Ok(Told::Unit(unit)) => {
+            Ok(UnitEvidence::Unit(unit)) => {
                 self.set_unit(unit);
                 Ok(())
             }
-            Ok(Told::Nothing) => Ok(()),
+            Ok(UnitEvidence::Nothing) => Ok(()),
             Err(why) => Err(self.unclear(&why, first)),
         }
     }
@@ -72,7 +72,7 @@ impl Decoder {
         let mut what = why.what();
         let path = match (given, &self.plan) {
             (Some(field), _) => printable(&field.text),
-            (None, Plan::Json(_)) => {
+            (None, Program::Json(_)) => {
                 let keys = first.first().map(|(_, payload)| json::keys::keys(payload));
                 what.push_str(&format!("; keys: {}", keys.unwrap_or_default().join(", ")));
                 "PATH".to_owned()
@@ -90,7 +90,7 @@ impl Decoder {
     fn bare_numbers(&self, payload: &[u8]) -> Vec<Bare> {
         let nobody = Nanos(0);
         let mut samples = Vec::new();
-        if let Plan::Json(plan) = &self.plan {
+        if let Program::Json(plan) = &self.plan {
             let Ok(found) = plan.find(payload) else {
                 return Vec::new();
             };
@@ -126,7 +126,7 @@ impl Decoder {
 
     fn set_unit(&mut self, unit: TimeUnit) {
         match (&mut self.plan, self.form.stamp) {
-            (Plan::Json(plan), _) => plan.settled = Some(unit),
+            (Program::Json(plan), _) => plan.settled = Some(unit),
             (_, StampForm::Count(_)) => self.form.stamp = StampForm::Count(unit),
             (_, StampForm::Float(_)) => self.form.stamp = StampForm::Float(unit),
             (_, StampForm::None | StampForm::SecNanos) => {}
@@ -134,7 +134,7 @@ impl Decoder {
     }
 
     fn settle_json(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
-        let Plan::Json(plan) = &mut self.plan else {
+        let Program::Json(plan) = &mut self.plan else {
             return Ok(());
         };
         let learnt = match plan.find(payload) {
@@ -179,10 +179,10 @@ impl Decoder {
         stated.declared.gyro_unit = one.unit.or(stated.declared.gyro_unit);
         stated.declared.sample_kind = one.kind.or(stated.declared.sample_kind);
         self.found = match one.gyro_rank {
-            None => Found::Nothing,
-            Some(5) if plan.vector_stamped => Found::Vector,
-            Some(5) if plan.px4.is_none() => Found::Twist,
-            Some(_) => Found::Named,
+            None => MatchQuality::Nothing,
+            Some(5) if plan.vector_stamped => MatchQuality::Vector,
+            Some(5) if plan.px4.is_none() => MatchQuality::Twist,
+            Some(_) => MatchQuality::Named,
         };
         let rivals = learnt.has_rival_stamps;
         drop(learnt);

@@ -159,13 +159,13 @@ pub(crate) struct Opening {
     /// Number of times that a line followed itself, by its place.
     repeated: BTreeMap<usize, u64>,
     bytes: usize,
-    found: Option<Found>,
+    found: Option<HeaderLine>,
     rows: usize,
 }
 
 /// A line that was looked at, once or several times the same.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Held {
+pub(crate) struct SampledLine {
     /// The number of the first, from 1.
     pub(crate) number: u64,
     pub(crate) line: Vec<u8>,
@@ -174,7 +174,7 @@ pub(crate) struct Held {
 
 /// Header that was found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Found {
+struct HeaderLine {
     /// Line of the header; of a table without one, its first row.
     at: usize,
     delimiter: Delimiter,
@@ -223,9 +223,9 @@ impl Opening {
         }
     }
 
-    fn header(&self, line: &[u8]) -> Option<Found> {
+    fn header(&self, line: &[u8]) -> Option<HeaderLine> {
         let at = self.lines.len();
-        let found = |at, delimiter, is_header, is_own| Found {
+        let found = |at, delimiter, is_header, is_own| HeaderLine {
             at,
             delimiter,
             is_header,
@@ -278,7 +278,7 @@ impl Opening {
     ///
     /// # Errors
     /// What is missing or cannot be told, in words with their help.
-    pub(crate) fn finish(self) -> Result<(Table, Vec<Held>), Diagnostic> {
+    pub(crate) fn finish(self) -> Result<(Table, Vec<SampledLine>), Diagnostic> {
         let Some(found) = self.found else {
             return Err(self.nothing());
         };
@@ -428,13 +428,13 @@ fn numbers_as_names(columns: usize) -> Vec<Name> {
 fn numbered<'l>(
     lines: impl Iterator<Item = (usize, &'l Vec<u8>)>,
     repeated: &BTreeMap<usize, u64>,
-) -> Vec<Held> {
+) -> Vec<SampledLine> {
     let mut before = 0;
     let held = |(at, line): (usize, &Vec<u8>)| {
         let again = repeated.get(&at).copied().unwrap_or(0);
         let number = at as u64 + 1 + before;
         before += again;
-        Held {
+        SampledLine {
             number,
             line: line.clone(),
             times: 1 + again,

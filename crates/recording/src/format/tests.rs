@@ -7,7 +7,7 @@ use crate::mcap::{Reader, WalkOptions, survey};
 use crate::pool::Pool;
 use crate::records::imu;
 use crate::records::problem::{ProblemKind, Problems};
-use crate::records::transcript::{Step, Transcript};
+use crate::records::transcript::{ReadProgress, Transcript};
 use crate::{Recording, Selection, Warn};
 use std::ops::ControlFlow;
 
@@ -28,12 +28,12 @@ struct Toy {
 }
 
 impl Transcribe for Toy {
-    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> ReadProgress {
         let length = if self.at == 0 { TOY.magic.len() } else { 3 };
         let Some(record) = ahead.get(..length) else {
             return match is_end {
-                true => Step::Used(ahead.len()),
-                false => Step::Need(length),
+                true => ReadProgress::Used(ahead.len()),
+                false => ReadProgress::Need(length),
             };
         };
         match (self.at, record) {
@@ -51,7 +51,7 @@ impl Transcribe for Toy {
             }
         }
         self.at += 1;
-        Step::Used(length)
+        ReadProgress::Used(length)
     }
 
     fn finish(self: Box<Self>) -> (String, Problems) {

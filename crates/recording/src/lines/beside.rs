@@ -13,7 +13,7 @@ use strapd_attitude::record::{Declared, Nanos};
 
 /// A file beside the one with the rates, and what is next in it.
 #[derive(Debug)]
-pub(super) struct Beside<R> {
+pub(super) struct SidecarFile<R> {
     lines: Box<Lines<R>>,
     /// Name of the file in errors.
     file: String,
@@ -28,7 +28,7 @@ impl<R: Read> Lines<R> {
     /// As [`Lines::next`].
     pub fn with(mut self, other: Lines<R>) -> Result<Lines<R>> {
         let file = other.name.file_name().unwrap_or_default();
-        let mut beside = Beside {
+        let mut beside = SidecarFile {
             file: printable(&file.to_string_lossy()),
             lines: Box::new(other),
             next: ((None, Vec::new()), 0),
@@ -46,7 +46,7 @@ impl<R: Read> Lines<R> {
                 (self.next_own(&mut samples)?, samples)
             }
         };
-        let is_over = |beside: &Beside<R>| beside.next.0.0.is_none();
+        let is_over = |beside: &SidecarFile<R>| beside.next.0.0.is_none();
         let others = self.beside.iter_mut().filter(|beside| !is_over(beside));
         let earliest = others.min_by_key(|beside| instant(&beside.next.0));
         // What comes behind the last rate corrects nothing.
@@ -61,7 +61,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-impl<R: Read> Beside<R> {
+impl<R: Read> SidecarFile<R> {
     pub(super) fn declared(&self) -> Declared {
         self.lines.declared()
     }

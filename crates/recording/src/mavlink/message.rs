@@ -10,7 +10,7 @@ const MILLI_G: f64 = 9.806_65e-3;
 
 /// A message that is read.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Known {
+pub(super) struct MessageSpec {
     pub(super) name: &'static str,
     /// Number made of the fields that the checksum has beside the frame.
     extra: u8,
@@ -43,7 +43,7 @@ pub(super) struct Sample {
 }
 
 /// Number, name, and so on.
-const KNOWN: [(u32, Known); 6] = [
+const KNOWN: [(u32, MessageSpec); 6] = [
     (0, known("HEARTBEAT", 50, Form::Other)),
     (26, known("SCALED_IMU", 170, Form::Scaled)),
     (27, known("RAW_IMU", 144, Form::Raw)),
@@ -52,12 +52,12 @@ const KNOWN: [(u32, Known); 6] = [
     (129, known("SCALED_IMU3", 46, Form::Scaled)),
 ];
 
-const fn known(name: &'static str, extra: u8, form: Form) -> Known {
-    Known { name, extra, form }
+const fn known(name: &'static str, extra: u8, form: Form) -> MessageSpec {
+    MessageSpec { name, extra, form }
 }
 
 /// A message by its number.
-pub(super) fn of(number: u32) -> Option<Known> {
+pub(super) fn of(number: u32) -> Option<MessageSpec> {
     let mut known = KNOWN.iter();
     known.find(|(n, _)| *n == number).map(|(_, known)| *known)
 }
@@ -67,7 +67,7 @@ pub(super) fn checksum_of(number: u32) -> Option<u8> {
     of(number).map(|known| known.extra)
 }
 
-impl Known {
+impl MessageSpec {
     /// The unit of its rates, where the protocol does not say it.
     pub(super) fn assumed(self) -> Option<&'static str> {
         (self.form == Form::Raw).then_some("mrad/s and mg, as ArduPilot sends them")

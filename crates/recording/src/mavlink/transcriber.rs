@@ -8,7 +8,7 @@ use super::message;
 use crate::decode::known_definition;
 use crate::records::imu;
 use crate::records::problem::{ProblemKind, Problems};
-use crate::records::transcript::{Step, Transcribe, Transcript};
+use crate::records::transcript::{ReadProgress, Transcribe, Transcript};
 use std::collections::BTreeMap;
 
 /// Bytes looked at to believe a frame, and to find one.
@@ -31,9 +31,9 @@ pub(crate) struct Transcriber {
 }
 
 impl Transcribe for Transcriber {
-    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> ReadProgress {
         if ahead.len() < WINDOW && !is_end {
-            return Step::Need(WINDOW);
+            return ReadProgress::Need(WINDOW);
         }
         let used = match frame(ahead) {
             Ok(found) if is_believed(&found, ahead) => {
@@ -68,7 +68,7 @@ impl Transcribe for Transcriber {
         if is_end && used == ahead.len() {
             self.found();
         }
-        Step::Used(used)
+        ReadProgress::Used(used)
     }
 
     fn finish(self: Box<Self>) -> (String, Problems) {

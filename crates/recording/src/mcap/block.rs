@@ -5,7 +5,7 @@
 
 mod bag;
 
-use super::input::{Held, LogFile, Stretch};
+use super::input::{LogFile, OwnedBytes, Stretch};
 use crate::records::problem::ProblemKind;
 use crate::records::transcript::Transcript;
 use crate::records::{HEAD, head_at, op};
@@ -110,7 +110,7 @@ pub(super) enum Payload {
         offset: u64,
         len: usize,
     },
-    Held(Held),
+    Held(OwnedBytes),
 }
 
 impl Block {
@@ -120,7 +120,7 @@ impl Block {
         (!bytes.is_empty()).then_some(Block {
             offset,
             kind: Kind::Transcript,
-            payload: Payload::Held(Held { bytes, range }),
+            payload: Payload::Held(OwnedBytes { bytes, range }),
         })
     }
 

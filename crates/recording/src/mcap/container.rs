@@ -9,7 +9,7 @@ mod rosbag2;
 mod transcribed;
 
 use super::index::Passed;
-use super::scan::{Besides, Facts, Item, Scanner};
+use super::scan::{Facts, Item, OtherRecords, Scanner};
 use super::{Payload, Reader};
 use crate::format::Reading;
 use crate::records::problem::Problems;
@@ -43,7 +43,7 @@ pub(super) trait Container: Debug {
 }
 
 /// Begins the walk over an input.
-pub(super) fn scan(reader: Reader, besides: Besides) -> Box<dyn Container> {
+pub(super) fn scan(reader: Reader, besides: OtherRecords) -> Box<dyn Container> {
     let Reader {
         input,
         limits,

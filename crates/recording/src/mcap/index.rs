@@ -100,12 +100,12 @@ fn indexed(of: &ChunkIndex<'_>, limits: Limits) -> Option<Indexed> {
 
 /// The chunks that a summary names, as it is read.
 #[derive(Debug, Default)]
-pub(super) struct Gathered {
+pub(super) struct ChunkList {
     chunks: Vec<Indexed>,
     is_wrong: bool,
 }
 
-impl Gathered {
+impl ChunkList {
     pub(super) fn add(&mut self, of: &ChunkIndex<'_>, limits: Limits) {
         match indexed(of, limits) {
             Some(chunk) if chunk.compression.is_some() => self.chunks.push(chunk),

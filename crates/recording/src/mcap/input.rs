@@ -4,7 +4,7 @@
 //! and a way to hand a stretch of them to another thread. Files are read by position
 //! (no memory map: a file cut by another process must be an error, not a signal), streams in sequence.
 
-use crate::elsewhere::Object;
+use crate::remote_object::Object;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -162,12 +162,12 @@ impl Input {
 
 /// Bytes that belong to whoever holds them: `bytes[range]`.
 #[derive(Debug, Default)]
-pub(super) struct Held {
+pub(super) struct OwnedBytes {
     pub(super) bytes: Vec<u8>,
     pub(super) range: Range<usize>,
 }
 
-impl Held {
+impl OwnedBytes {
     pub(super) fn as_slice(&self) -> &[u8] {
         self.bytes.get(self.range.clone()).unwrap_or(&[])
     }
@@ -313,7 +313,7 @@ impl Tape {
 
     /// Hands out the next `n` bytes, which must be available, without copying them; what was read
     /// beyond them moves to a spare buffer.
-    pub(super) fn hand_out(&mut self, n: usize) -> Held {
+    pub(super) fn hand_out(&mut self, n: usize) -> OwnedBytes {
         let n = n.min(self.end - self.start);
         let cut = self.start + n;
         let mut next = self.spare.pop().unwrap_or_default();
@@ -325,7 +325,7 @@ impl Tape {
             room.copy_from_slice(tail);
         }
         let tail = tail.len();
-        let held = Held {
+        let held = OwnedBytes {
             bytes: std::mem::replace(&mut self.buf, next),
             range: self.start..cut,
         };
@@ -337,7 +337,7 @@ impl Tape {
 
     /// The next `n` bytes as [`Tape::hand_out`], copied, if they are buffered already: for stretches
     /// so short that a buffer for each would be waste.
-    pub(super) fn copy_out(&mut self, n: usize) -> Option<Held> {
+    pub(super) fn copy_out(&mut self, n: usize) -> Option<OwnedBytes> {
         if n > self.ahead().len() {
             return None;
         }
@@ -346,11 +346,11 @@ impl Tape {
         bytes.extend_from_slice(self.ahead().get(..n)?);
         self.start += n;
         self.position += n as u64;
-        Some(Held { bytes, range: 0..n })
+        Some(OwnedBytes { bytes, range: 0..n })
     }
 
     /// Takes back a buffer that was handed out.
-    pub(super) fn recycle(&mut self, held: Held) {
+    pub(super) fn recycle(&mut self, held: OwnedBytes) {
         let bytes = held.bytes.capacity();
         if bytes <= SMALL_BYTES && self.small.len() < SMALL {
             self.small.push(held.bytes);

@@ -5,7 +5,7 @@
 
 use super::block::Buffers;
 use super::container::scan;
-use super::scan::{Besides, Item};
+use super::scan::{Item, OtherRecords};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
@@ -37,7 +37,7 @@ pub fn list(
     mut visit: impl FnMut(Listed<'_>) -> ControlFlow<()>,
 ) -> Result<(Facts, Problems)> {
     let name = reader.name().to_owned();
-    let mut scanner = scan(reader, Besides::Everything);
+    let mut scanner = scan(reader, OtherRecords::Everything);
     let mut buffers = Buffers::default();
     let mut problems = Problems::default();
     loop {

@@ -183,7 +183,7 @@ impl<T> Batch<T> {
 }
 
 #[derive(Debug)]
-struct Waiting<T> {
+struct QueuedBatch<T> {
     batch: Batch<T>,
     blocks: usize,
     bytes: usize,
@@ -193,7 +193,7 @@ struct Waiting<T> {
 #[derive(Debug)]
 pub(super) struct Merger<T> {
     lookahead: Lookahead,
-    window: VecDeque<Waiting<T>>,
+    window: VecDeque<QueuedBatch<T>>,
     /// Blocks and bytes behind the front of the window.
     blocks: usize,
     bytes: usize,
@@ -241,7 +241,7 @@ impl<T> Merger<T> {
             self.bytes += bytes;
             self.weight += batch.weight;
         }
-        self.window.push_back(Waiting {
+        self.window.push_back(QueuedBatch {
             batch,
             blocks: 1,
             bytes,
@@ -312,7 +312,7 @@ impl<T> Merger<T> {
             self.blocks = self.blocks.saturating_sub(next.blocks);
             self.bytes = self.bytes.saturating_sub(next.bytes);
             self.weight = self.weight.saturating_sub(next.batch.weight);
-            self.window.push_front(Waiting {
+            self.window.push_front(QueuedBatch {
                 batch: front.batch.merge(next.batch),
                 blocks: front.blocks + next.blocks,
                 bytes: front.bytes + next.bytes,

@@ -11,7 +11,7 @@ use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
 use super::container::Container;
 use super::index::Passed;
-use super::input::{Held, Input, Tape};
+use super::input::{Input, OwnedBytes, Tape};
 use super::resync;
 use crate::format::Format;
 use crate::records::problem::{ProblemKind, Problems};
@@ -57,7 +57,7 @@ pub struct Facts {
 
 /// Items handed out besides blocks of messages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Besides {
+pub(super) enum OtherRecords {
     Nothing,
     /// Blocks of their own that a copy takes along: header, attachments, metadata.
     Attached,
@@ -69,11 +69,11 @@ pub(super) enum Besides {
 #[derive(Debug)]
 pub(super) enum Item {
     Block(Block),
-    /// A record that is neither chunk, message nor definition; only for [`Besides::Everything`].
+    /// A record that is neither chunk, message nor definition; only for [`OtherRecords::Everything`].
     Other {
         opcode: u8,
         offset: u64,
-        body: Held,
+        body: OwnedBytes,
     },
 }
 
@@ -92,7 +92,7 @@ pub(super) struct Scanner {
     tape: Tape,
     limits: Limits,
     section: Section,
-    besides: Besides,
+    besides: OtherRecords,
     /// The last record that was skipped on the word of its length alone, for going back to
     /// when what follows it is garbage.
     trusted: Option<u64>,
@@ -115,7 +115,7 @@ pub(super) struct Scanner {
 
 impl Scanner {
     /// Starts behind the magic, which has been checked.
-    pub(super) fn new(input: Input, limits: Limits, besides: Besides) -> Self {
+    pub(super) fn new(input: Input, limits: Limits, besides: OtherRecords) -> Self {
         let start = MAGIC.len() as u64;
         let mut tape = Tape::new(input, start);
         tape.seek(start);
@@ -159,7 +159,7 @@ impl Scanner {
             kind: Kind::PassedOver {
                 size: next.unpacked,
             },
-            payload: Payload::Held(Held::default()),
+            payload: Payload::Held(OwnedBytes::default()),
         }))
     }
 
@@ -287,7 +287,7 @@ impl Scanner {
 
     /// Whether a record without messages is read for what it says.
     fn is_wanted(&self, opcode: u8, length: u64) -> bool {
-        self.besides == Besides::Everything
+        self.besides == OtherRecords::Everything
             || match opcode {
                 op::METADATA => length <= METADATA_READ,
                 opcode => matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS),
@@ -304,7 +304,7 @@ impl Scanner {
             op::FOOTER => self.section = Section::Footer,
             _ => {}
         }
-        let attached = self.besides == Besides::Attached
+        let attached = self.besides == OtherRecords::Attached
             && matches!(opcode, op::HEADER | op::ATTACHMENT | op::METADATA);
         let wanted = attached || self.is_wanted(opcode, length);
         let limit = match opcode {
@@ -338,7 +338,7 @@ impl Scanner {
                 self.problems.add(at, kind, None);
             }
         }
-        if !attached && self.besides != Besides::Everything {
+        if !attached && self.besides != OtherRecords::Everything {
             self.pass_over(total)?;
             return Ok(None);
         }

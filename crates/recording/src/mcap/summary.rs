@@ -5,7 +5,7 @@
 
 use super::Limits;
 use super::channels::Fallback;
-use super::index::{Gathered, Index};
+use super::index::{ChunkList, Index};
 use super::input::{Input, LogFile, Tape};
 use crate::records::record::{Body, Footer, Record, Statistics};
 use crate::records::{HEAD, MAGIC, head_at, op};
@@ -26,7 +26,7 @@ pub(super) struct Summary {
     /// Chunks by compression name.
     pub(super) chunks: BTreeMap<String, u64>,
     /// Ranges gathered of a remote object.
-    gathered: Option<Gathered>,
+    gathered: Option<ChunkList>,
     /// Index of what need not be read.
     pub(super) index: Option<Index>,
     /// Bytes of definitions so far.
@@ -34,13 +34,13 @@ pub(super) struct Summary {
 }
 
 /// A summary, none (`Ok(None)`), or why there is one that cannot be used.
-pub(super) type Found = Result<Option<Summary>, &'static str>;
+pub(super) type SummaryResult = Result<Option<Summary>, &'static str>;
 
 /// Reads the summary of a file.
 ///
 /// # Errors
 /// Only when the file itself cannot be read.
-pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<Found> {
+pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<SummaryResult> {
     const END: usize = HEAD + Footer::LEN as usize + MAGIC.len();
     let Some(footer_at) = file
         .len
@@ -70,7 +70,7 @@ pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<Found> {
     let mut tape = Tape::new(Input::File(Arc::clone(file)), start);
     let mut crc = crc32fast::Hasher::new();
     let mut summary = Summary {
-        gathered: file.object().map(|_| Gathered::default()),
+        gathered: file.object().map(|_| ChunkList::default()),
         ..Summary::default()
     };
     while tape.position() < footer_at {

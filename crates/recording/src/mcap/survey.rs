@@ -9,7 +9,7 @@ use super::container::{self, Container};
 use super::index::PassedOver;
 use super::input::Input;
 use super::messages::Tally;
-use super::scan::{Besides, Facts, Scanner};
+use super::scan::{Facts, OtherRecords, Scanner};
 use super::summary::{self, Summary};
 use super::walk::{WalkOptions, walk};
 use super::{Reader, read_error};
@@ -233,7 +233,7 @@ fn header(reader: &Reader) -> Result<Facts> {
         return Ok(Facts::default());
     };
     let name = again.name().to_owned();
-    let mut scanner = Scanner::new(again.input, again.limits, Besides::Everything);
+    let mut scanner = Scanner::new(again.input, again.limits, OtherRecords::Everything);
     scanner.next().map_err(|e| read_error(&name, 0, e))?;
     if scanner.facts.library.starts_with(OURS) {
         scanner.next().map_err(|e| read_error(&name, 0, e))?;

@@ -12,7 +12,7 @@ use super::container::scan;
 use super::input::Input;
 use super::messages::Message;
 use super::order::{Batch, Lookahead, Merger, Order};
-use super::scan::Besides;
+use super::scan::OtherRecords;
 use super::survey::{Survey, fallback};
 use super::workers::{Shared, Ticket};
 use super::{Reader, read_error};
@@ -116,7 +116,7 @@ where
         select,
         map,
         consume,
-        Besides::Nothing,
+        OtherRecords::Nothing,
         |_| {},
     )
 }
@@ -153,7 +153,7 @@ where
         select,
         map,
         consume,
-        Besides::Attached,
+        OtherRecords::Attached,
         attached,
     )
 }
@@ -164,7 +164,7 @@ fn travel<T, D, S, M, C, A>(
     mut select: S,
     map: M,
     mut consume: C,
-    besides: Besides,
+    besides: OtherRecords,
     mut attached: A,
 ) -> Result<WalkReport>
 where
@@ -181,7 +181,10 @@ where
         fallback(&reader, &mut problems).map_err(|e| read_error(&name, 0, e))?;
     let is_stream = file_size.is_none();
     let mut table = Table::new(fallback, limits.definitions);
-    let index = reader.index.clone().filter(|_| besides == Besides::Nothing);
+    let index = reader
+        .index
+        .clone()
+        .filter(|_| besides == OtherRecords::Nothing);
     let passed = index.map(|index| {
         let wanted = table.adopt_all(&mut select, &mut problems);
         let passed = index.passed_over(wanted, options.only_firsts);

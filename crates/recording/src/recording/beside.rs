@@ -19,7 +19,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
 
 /// Channels that are read beside those of the samples.
@@ -77,7 +77,7 @@ pub fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
 /// # Errors
 /// A topic that is not there, or carries nothing of the kind; several that may be meant.
 pub fn choose(
-    (plan, selection): (&Plan, &Selection),
+    (plan, selection): (&EstimationSettings, &Selection),
     path: &Path,
     log: &Recording,
     (own, has_field): (&str, bool),
@@ -103,7 +103,11 @@ pub fn choose(
 ///
 /// # Errors
 /// Several that may be meant, or none.
-pub(super) fn of_fields(plan: &Plan, log: &Recording, own: &str) -> Result<AuxiliaryInputs> {
+pub(super) fn of_fields(
+    plan: &EstimationSettings,
+    log: &Recording,
+    own: &str,
+) -> Result<AuxiliaryInputs> {
     let mut besides = AuxiliaryInputs::default();
     besides.add(unnamed(plan, log.name(), log, own)?);
     Ok(besides)
@@ -126,7 +130,7 @@ impl<'l> Vectors<'l> {
     /// The topics of `log` with magnetic fields, and with specific forces.
     #[must_use]
     pub fn of(log: &'l Recording) -> Vectors<'l> {
-        let plan = Plan::default();
+        let plan = EstimationSettings::default();
         let fields = readable(&plan, log, Wanted::Fields);
         Vectors {
             forces: listed(log, Wanted::Forces, &readable(&plan, log, Wanted::Forces)),
@@ -152,7 +156,11 @@ impl<'l> Vectors<'l> {
 }
 
 /// The channels with vectors of this kind, with their decoders.
-fn readable<'l>(plan: &Plan, log: &'l Recording, wanted: Wanted) -> Vec<Readable<'l>> {
+fn readable<'l>(
+    plan: &EstimationSettings,
+    log: &'l Recording,
+    wanted: Wanted,
+) -> Vec<Readable<'l>> {
     let mut decoders = Decoders::of_run(plan, &options(wanted, None));
     let channels = log.channels.iter();
     channels
@@ -194,7 +202,7 @@ fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicO
 }
 
 fn named<'l>(
-    plan: &Plan,
+    plan: &EstimationSettings,
     wanted: Wanted,
     beside: &TopicBeside,
     path: &Path,
@@ -227,14 +235,19 @@ fn named<'l>(
 }
 
 /// The topic whose field is taken unnamed.
-fn unnamed<'l>(plan: &Plan, path: &Path, log: &'l Recording, own: &str) -> Result<Readable<'l>> {
+fn unnamed<'l>(
+    plan: &EstimationSettings,
+    path: &Path,
+    log: &'l Recording,
+    own: &str,
+) -> Result<Readable<'l>> {
     let found = stamped(plan, readable(plan, log, Wanted::Fields));
     let one = one_beside(&found, own).map_err(|what| Error::unsupported(path, what))?;
     Ok(one.clone())
 }
 
 /// Keeps the channels whose messages can be placed in time.
-fn stamped<'l>(plan: &Plan, mut found: Vec<Readable<'l>>) -> Vec<Readable<'l>> {
+fn stamped<'l>(plan: &EstimationSettings, mut found: Vec<Readable<'l>>) -> Vec<Readable<'l>> {
     found.retain(|(_, decoder)| decoder.stated().has_stamp || plan.clock != Clock::Header);
     found
 }

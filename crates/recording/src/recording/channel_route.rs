@@ -36,12 +36,12 @@ pub struct RouteTarget {
     /// Index of the stream in the run.
     pub stream: usize,
     /// Notes for the summary.
-    pub noticed: Arc<Noticed>,
+    pub noticed: Arc<PayloadNotes>,
 }
 
 /// Observations in payloads; sums, so that the order of the workers does not show.
 #[derive(Debug, Default)]
-pub struct Noticed {
+pub struct PayloadNotes {
     /// Samples whose gyro the message marks as absent.
     pub gyro_marked_absent: AtomicU64,
     /// Stamps with a second or more of nanoseconds.
@@ -62,18 +62,18 @@ pub struct Noticed {
 /// Foreign frames that are told apart.
 const FOREIGN: usize = 16;
 
-impl Noticed {
+impl PayloadNotes {
     /// Makes it for the samples of a source.
     #[must_use]
-    pub fn of(source: &Publisher) -> Noticed {
-        Noticed {
+    pub fn of(source: &Publisher) -> PayloadNotes {
+        PayloadNotes {
             frame_id: source
                 .frame
                 .clone()
                 .map_or_else(OnceLock::new, OnceLock::from),
             any_frame: source.frame.is_none(),
             others: source.others.clone(),
-            ..Noticed::default()
+            ..PayloadNotes::default()
         }
     }
 
@@ -143,9 +143,9 @@ impl Route {
     /// Messages that are samples of a stream, whatever frame they name.
     #[must_use]
     pub fn samples(decoder: Decoder, stream: usize) -> Route {
-        let noticed = Noticed {
+        let noticed = PayloadNotes {
             any_frame: true,
-            ..Noticed::default()
+            ..PayloadNotes::default()
         };
         Route::to(
             decoder,

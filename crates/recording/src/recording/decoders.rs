@@ -8,7 +8,7 @@ use crate::mcap::{Channel, Schema};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::record::Nanos;
 
 /// Decoders under the same options. The schemas of a log together are compiled within one fixed effort, however many.
@@ -52,7 +52,7 @@ impl Decoders {
 
     /// Makes an empty set for a run of `plan`.
     #[must_use]
-    pub fn of_run(plan: &Plan, options: &Options) -> Decoders {
+    pub fn of_run(plan: &EstimationSettings, options: &Options) -> Decoders {
         Decoders {
             stamps: match plan.clock {
                 Clock::Header => Stamps::Stated,

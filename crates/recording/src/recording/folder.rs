@@ -4,7 +4,7 @@
 //! beside it have what corrects them, or nothing of use here.
 
 use super::line_input;
-use super::made_before::MadeBefore;
+use super::own_output::MadeBefore;
 use super::warn::Warn;
 use crate::decode::{Options, Wanted};
 use crate::delimited::Table;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// Channel whose messages are held.
 #[derive(Debug)]
-pub struct Held {
+pub struct HeldChannel {
     channel: Arc<Channel>,
     /// Decoder by which it will be read.
     decoder: Decoder,
@@ -27,7 +27,7 @@ pub struct Held {
     route: Option<Route>,
 }
 
-impl Held {
+impl HeldChannel {
     /// Makes it before its first message; `number` is its own among the channels of the topic.
     #[must_use]
     pub fn new(
@@ -36,8 +36,8 @@ impl Held {
         taker: RouteTarget,
         number: usize,
         copied: Option<Arc<Channel>>,
-    ) -> Held {
-        Held {
+    ) -> HeldChannel {
+        HeldChannel {
             channel: channel.clone(),
             decoder,
             taker,

@@ -12,12 +12,12 @@ use super::warn::Warn;
 use crate::address::Address;
 use crate::decode::{Options, Wanted};
 use crate::delimited::Table;
-use crate::elsewhere::{self, Found, Object, ObjectBytes};
 use crate::error::{Error, Result};
 use crate::format::{Format, open};
 use crate::lines::Lines;
 use crate::mcap::Reader;
 use crate::parquet::{Rows, Trouble};
+use crate::remote_object::{self, Object, ObjectBytes, RemoteSource};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ impl Source {
     pub fn parse(text: &str) -> Source {
         if text == "-" {
             Source::Stdin
-        } else if let Some(address) = elsewhere::meant(text) {
+        } else if let Some(address) = remote_object::meant(text) {
             Source::Elsewhere(address)
         } else {
             Source::File(PathBuf::from(text))
@@ -79,7 +79,7 @@ impl Source {
 
 /// Input that is read again, beside files that have a name.
 #[derive(Clone, Debug)]
-enum Kept {
+enum Rereadable {
     /// Copy of what came only once.
     File(Arc<File>),
     /// Object elsewhere.
@@ -122,7 +122,7 @@ impl Seek for Bytes {
 pub struct Input {
     source: Source,
     name: PathBuf,
-    kept: Option<Kept>,
+    kept: Option<Rereadable>,
     format: Format,
     /// Tables of the same recording.
     beside: Vec<PathBuf>,
@@ -174,28 +174,28 @@ impl Input {
 
     fn of_address(address: Address, warn: &Warn) -> Result<Input> {
         let name = PathBuf::from(address.place());
-        let found = elsewhere::find(&address).map_err(|what| Error::Unreached {
+        let found = remote_object::find(&address).map_err(|what| Error::Unreached {
             path: name.clone(),
             what,
         })?;
         let source = Source::Elsewhere(address);
         let object = match found {
-            Found::Stream(from) => return Input::keep(source, from, warn),
-            Found::Object(object) if object.size() == 0 => {
+            RemoteSource::Stream(from) => return Input::keep(source, from, warn),
+            RemoteSource::Object(object) if object.size() == 0 => {
                 return Err(Error::Empty { path: name });
             }
-            Found::Object(object) => object,
+            RemoteSource::Object(object) => object,
         };
         let mut bytes = ObjectBytes::new(Arc::clone(&object));
         let format = Format::of_seekable(&name, &mut bytes, object.size())?;
         let format = checked(&name, format, warn);
         if format.is_text() {
-            object.expect(elsewhere::whole(object.as_ref()), TEXT_AHEAD);
+            object.expect(remote_object::whole(object.as_ref()), TEXT_AHEAD);
         }
         Ok(Input {
             source,
             name,
-            kept: Some(Kept::Object(object)),
+            kept: Some(Rereadable::Object(object)),
             format,
             beside: Vec::new(),
             parts: Vec::new(),
@@ -289,7 +289,7 @@ impl Input {
                 .or_else(named)
                 .or_else(|| Format::of_shape(&head))
                 .unwrap_or(Format::Mcap),
-            kept: Some(Kept::File(Arc::new(file))),
+            kept: Some(Rereadable::File(Arc::new(file))),
             source,
             name,
             beside: Vec::new(),
@@ -335,10 +335,10 @@ impl Input {
         self.is_one_file()?;
         let kept = match &self.kept {
             None => return Ok(Bytes::File(open(&self.name)?)),
-            Some(Kept::Object(object)) => {
+            Some(Rereadable::Object(object)) => {
                 return Ok(Bytes::Object(ObjectBytes::new(Arc::clone(object))));
             }
-            Some(Kept::File(kept)) => kept,
+            Some(Rereadable::File(kept)) => kept,
         };
         let again = kept.try_clone().and_then(|mut file| {
             file.rewind()?;
@@ -395,7 +395,9 @@ impl Input {
         self.is_one_file()?;
         match (&self.kept, self.bytes()?) {
             (None, _) => Reader::open(&self.name),
-            (Some(Kept::Object(object)), _) => Reader::of_object(&self.name, Arc::clone(object)),
+            (Some(Rereadable::Object(object)), _) => {
+                Reader::of_object(&self.name, Arc::clone(object))
+            }
             (_, Bytes::File(kept)) => Reader::of_file(&self.name, kept),
             (_, Bytes::Object(_) | Bytes::Rows(_)) => Reader::open(&self.name),
         }

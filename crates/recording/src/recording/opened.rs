@@ -9,10 +9,10 @@ use super::first_messages::first_messages;
 use super::input::Input;
 use super::line_input::only_for_tables;
 use super::log_channel::{LogChannel, known};
-use super::made_before::{self, MadeBefore};
+use super::own_output::{self, MadeBefore};
 use super::parts::{self, Same, Whole};
 use super::sample_cache;
-use super::sources::{self, Known, Publisher};
+use super::sources::{self, ChannelMap, Publisher};
 use super::text_log::TextLog;
 use crate::decode::Options;
 use crate::error::{Error, Result};
@@ -199,16 +199,16 @@ impl Recording {
     ) -> Result<Recording> {
         let mut log = Recording::surveyed(input, options, pool)?;
         let told = {
-            let readers: Vec<(Reader, Known<'_>)> = match &log.body {
+            let readers: Vec<(Reader, ChannelMap<'_>)> = match &log.body {
                 Body::Parts(parts) => parts
                     .iter()
                     .filter_map(|(log, same)| {
-                        let known: Known<'_> = Box::new(|met| same.known(met));
+                        let known: ChannelMap<'_> = Box::new(|met| same.known(met));
                         Some((log.reader()?, known))
                     })
                     .collect(),
                 _ => {
-                    let known = |reader| (reader, Box::new(Arc::clone) as Known<'_>);
+                    let known = |reader| (reader, Box::new(Arc::clone) as ChannelMap<'_>);
                     log.reader().into_iter().map(known).collect()
                 }
             };
@@ -251,12 +251,12 @@ impl Recording {
     #[must_use]
     pub fn made_before(&self) -> Option<MadeBefore> {
         if !self.input.format().is_text() {
-            return made_before::in_survey(&self.survey);
+            return own_output::in_survey(&self.survey);
         }
         let mut head = Vec::new();
         let bytes = self.input.text(&Options::default()).ok()?;
-        bytes.take(made_before::HEAD).read_to_end(&mut head).ok()?;
-        made_before::in_text(&head)
+        bytes.take(own_output::HEAD).read_to_end(&mut head).ok()?;
+        own_output::in_text(&head)
     }
 
     /// Name in messages.

@@ -3,8 +3,8 @@
 //! Apart from the parts because nothing is opened yet: what comes only once or was given twice is told before a
 //! second of reading.
 
-use crate::elsewhere;
 use crate::error::{Error, Result};
+use crate::remote_object;
 use crate::text::printable;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
     }
     let mut known: Vec<(PathBuf, &PathBuf)> = Vec::new();
     for path in paths {
-        if let Some(address) = elsewhere::meant(&path.to_string_lossy()) {
+        if let Some(address) = remote_object::meant(&path.to_string_lossy()) {
             return Err(Error::unsupported(
                 Path::new(&address.place()),
                 Diagnostic::new("is elsewhere, and parts are read from files")
@@ -78,7 +78,7 @@ pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
 
 /// A part as it is printed, though it should be none.
 fn shown(path: &Path) -> PathBuf {
-    match elsewhere::meant(&path.to_string_lossy()) {
+    match remote_object::meant(&path.to_string_lossy()) {
         Some(address) => PathBuf::from(address.place()),
         None => path.to_owned(),
     }

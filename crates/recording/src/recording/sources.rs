@@ -82,7 +82,7 @@ const MOST_FRAMES: usize = 8;
 const FEW: u64 = 3;
 
 /// Map from a channel met in one of the recording's files to the recording's own.
-pub(super) type Known<'k> = Box<dyn Fn(&Arc<Channel>) -> Arc<Channel> + 'k>;
+pub(super) type ChannelMap<'k> = Box<dyn Fn(&Arc<Channel>) -> Arc<Channel> + 'k>;
 
 /// Channels whose messages are looked at, and what came of it so far.
 #[derive(Default)]
@@ -115,7 +115,7 @@ impl Look {
                 .filter_map(|index| Some((*index, channels.get(*index)?)))
                 .filter(|(_, k)| k.messages > 0 && standing.is_of(k))
                 .collect();
-            let several = speaking.len() > 1 && standing != Standing::Shown;
+            let several = speaking.len() > 1 && standing != TopicPurpose::Shown;
             for (index, known) in speaking {
                 if look.looked.len() >= MOST_CHANNELS {
                     break;
@@ -125,11 +125,11 @@ impl Look {
                 };
                 let is_bare = decoder.has_bare_stamps();
                 let is_opened = is_bare || decoder.stamps().len() > 1;
-                let speaks = standing != Standing::Shown && (several || decoder.names_frames());
+                let speaks = standing != TopicPurpose::Shown && (several || decoder.names_frames());
                 if !speaks && !is_opened {
                     continue;
                 }
-                if standing != Standing::Shown {
+                if standing != TopicPurpose::Shown {
                     look.missing += known.messages.min(FIRST);
                     look.speakers
                         .entry(place)
@@ -182,7 +182,7 @@ impl Look {
 /// # Errors
 /// The log cannot be read.
 pub(super) fn tell_apart(
-    readers: Vec<(Reader, Known<'_>)>,
+    readers: Vec<(Reader, ChannelMap<'_>)>,
     channels: &mut [LogChannel],
     named: Option<&str>,
     options: &Options,
@@ -262,7 +262,7 @@ struct Looked {
 
 /// Why a topic is looked at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Standing {
+enum TopicPurpose {
     /// Named by the user.
     Named,
     /// Rate that may be integrated.
@@ -271,13 +271,13 @@ enum Standing {
     Shown,
 }
 
-impl Standing {
+impl TopicPurpose {
     fn is_of(self, known: &LogChannel) -> bool {
         let may_be_integrated = rank(&known.role) >= PICKED_UNNAMED;
         match self {
-            Standing::Named => true,
-            Standing::Rate => may_be_integrated,
-            Standing::Shown => !may_be_integrated && known.role.has_orientation,
+            TopicPurpose::Named => true,
+            TopicPurpose::Rate => may_be_integrated,
+            TopicPurpose::Shown => !may_be_integrated && known.role.has_orientation,
         }
     }
 }
@@ -286,7 +286,7 @@ impl Standing {
 fn in_turn<'s>(
     sources: &'s [Publisher],
     named: Option<&str>,
-) -> impl Iterator<Item = (usize, &'s Publisher, Standing)> {
+) -> impl Iterator<Item = (usize, &'s Publisher, TopicPurpose)> {
     let is_named = |source: &Publisher| {
         named
             .and_then(|name| name.strip_prefix(source.topic.as_str()))
@@ -297,9 +297,9 @@ fn in_turn<'s>(
     let of = |standing| move |(place, source): (usize, &'s Publisher)| (place, source, standing);
     first
         .into_iter()
-        .map(of(Standing::Named))
-        .chain(rest.clone().into_iter().map(of(Standing::Rate)))
-        .chain(rest.into_iter().map(of(Standing::Shown)))
+        .map(of(TopicPurpose::Named))
+        .chain(rest.clone().into_iter().map(of(TopicPurpose::Rate)))
+        .chain(rest.into_iter().map(of(TopicPurpose::Shown)))
 }
 
 /// Keeps a first message, as long as there are few.

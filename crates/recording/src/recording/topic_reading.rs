@@ -3,7 +3,7 @@
 //! Apart from the replay for who looks at samples and integrates none: which topic, by which decoders, and the walk.
 
 use super::beside::{self, AuxiliaryInputs};
-use super::channel_route::{Item, Noticed, Route, RouteTarget};
+use super::channel_route::{Item, PayloadNotes, Route, RouteTarget};
 use super::decoders::Decoders;
 use super::log_channel::LogChannel;
 use super::opened::{AHEAD, Recording, problems};
@@ -16,7 +16,7 @@ use crate::pool::Pool;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::estimate::{EstimationSettings, Meaning};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 
 /// A topic that is read by itself.
@@ -89,7 +89,11 @@ impl<'l> TopicReading<'l> {
     pub fn with_fields(mut self) -> TopicReading<'l> {
         let has_field = |(_, decoder): &(&LogChannel, Decoder)| decoder.stated().has_mag;
         if !self.plan.channels.iter().any(has_field) {
-            let found = beside::of_fields(&Plan::default(), self.log, &self.plan.source.topic);
+            let found = beside::of_fields(
+                &EstimationSettings::default(),
+                self.log,
+                &self.plan.source.topic,
+            );
             self.besides = found.unwrap_or_default();
         }
         self
@@ -104,7 +108,7 @@ impl<'l> TopicReading<'l> {
             self = self.with_fields();
         }
         let own = (self.plan.source.topic.as_str(), true);
-        let asked = (&Plan::default(), selection);
+        let asked = (&EstimationSettings::default(), selection);
         let named = beside::choose(asked, self.log.name(), self.log, own)?;
         self.besides.append(named);
         Ok(self)
@@ -157,7 +161,7 @@ pub(super) fn walk_in_flu<E: From<Error>>(
 ) -> std::result::Result<u64, E> {
     let of_channel = |(_, decoder): &(&LogChannel, Decoder)| {
         let declared = &decoder.stated().declared;
-        let meaning = Meaning::new(&Plan::default(), declared);
+        let meaning = Meaning::new(&EstimationSettings::default(), declared);
         (meaning, declared.sample_kind)
     };
     let meanings: Vec<Vec<(Meaning, Option<SampleKind>)>> = readings
@@ -209,9 +213,9 @@ fn walk<E: From<Error>>(
     let begins: Vec<usize> = (0..readings.len())
         .map(|at| streams.partition_point(|(of, _)| *of < at))
         .collect();
-    let noticed: Vec<Arc<Noticed>> = readings
+    let noticed: Vec<Arc<PayloadNotes>> = readings
         .iter()
-        .map(|reading| Arc::new(Noticed::of(&reading.plan.source)))
+        .map(|reading| Arc::new(PayloadNotes::of(&reading.plan.source)))
         .collect();
     log.walk(
         AHEAD,

@@ -16,7 +16,7 @@ pub(crate) struct Transcript {
 
 /// Outcome for the bytes that a reader of another container was given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Step {
+pub(crate) enum ReadProgress {
     /// Number of bytes that were used.
     Used(usize),
     /// Number of bytes that are needed; none were used.
@@ -28,7 +28,7 @@ pub(crate) enum Step {
 pub(crate) trait Transcribe: Debug {
     /// Uses one record, or what stands in its place, of `ahead`: the bytes behind those used so far, and whether the log
     /// ends with them.
-    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step;
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> ReadProgress;
 
     /// Software or system that wrote the log, and what was wrong with it.
     fn finish(self: Box<Self>) -> (String, Problems);
@@ -44,8 +44,8 @@ pub(crate) trait Transcribe: Debug {
         let (mut rest, mut need) = (ahead, 1);
         while !rest.is_empty() && to.bytes.len() < self.run() {
             match self.step(rest, is_end, to) {
-                Step::Used(n) => rest = rest.get(n..).unwrap_or(&[]),
-                Step::Need(n) => {
+                ReadProgress::Used(n) => rest = rest.get(n..).unwrap_or(&[]),
+                ReadProgress::Need(n) => {
                     need = n.max(rest.len() + 1);
                     break;
                 }

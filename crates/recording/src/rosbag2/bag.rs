@@ -9,7 +9,7 @@ use super::message::{Messages, Places, SPARE};
 use super::topics::{Small, TOPIC};
 use crate::records::transcript::Transcript;
 use crate::sqlite::{
-    Definition, Found, Header, Kind, Page, Pages, Row, Seen, TWICE, Table, definitions,
+    Definition, Header, Kind, Page, Pages, Row, Seen, TWICE, Table, TableItem, definitions,
 };
 use std::collections::BTreeMap;
 use std::io;
@@ -170,7 +170,7 @@ impl Bag {
     /// Only when the input itself cannot be read.
     pub(crate) fn next(&mut self, pages: &mut dyn Pages, to: &mut Transcript) -> io::Result<bool> {
         let rows = match self.table.next(pages, &mut self.seen)? {
-            Found::Row { page, rowid, row } => {
+            TableItem::Row { page, rowid, row } => {
                 self.last = self.last.max(rowid);
                 if let Err(why) = self.messages.tell(row, to) {
                     let kind = FaultKind::Row { why };
@@ -178,13 +178,13 @@ impl Bag {
                 }
                 return Ok(true);
             }
-            Found::LostRow { page, why } => {
+            TableItem::LostRow { page, why } => {
                 let kind = FaultKind::Row { why };
                 self.faults.push(Fault::at(page, kind, Some(1)));
                 return Ok(true);
             }
-            Found::End => return self.sweep(pages),
-            Found::LostPage { page, why, rows } => {
+            TableItem::End => return self.sweep(pages),
+            TableItem::LostPage { page, why, rows } => {
                 let lost = match why {
                     // Its rows were told where it was first.
                     TWICE => None,

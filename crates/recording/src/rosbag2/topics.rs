@@ -5,7 +5,7 @@
 use super::bag::{Fault, FaultKind};
 use crate::decode::known_definition;
 use crate::records::transcript::Transcript;
-use crate::sqlite::{Definition, Encoding, Found, Pages, Seen, Table, Value};
+use crate::sqlite::{Definition, Encoding, Pages, Seen, Table, TableItem, Value};
 use std::collections::BTreeMap;
 use std::io;
 
@@ -41,16 +41,16 @@ impl Small<'_> {
         let mut rows = Vec::new();
         while rows.len() < MOST {
             match table.next(self.pages, self.seen)? {
-                Found::End => return Ok(rows),
-                Found::LostRow { page, why } => {
+                TableItem::End => return Ok(rows),
+                TableItem::LostRow { page, why } => {
                     let kind = FaultKind::Row { why };
                     self.faults.push(Fault::at(page, kind, None));
                 }
-                Found::LostPage { page, why, .. } => {
+                TableItem::LostPage { page, why, .. } => {
                     let kind = FaultKind::Page { page, why };
                     self.faults.push(Fault::at(page, kind, None));
                 }
-                Found::Row { rowid, row, .. } => {
+                TableItem::Row { rowid, row, .. } => {
                     let mut cells = [const { Cell::Number(0) }; N];
                     for (nth, value) in row.enumerate() {
                         for (cell, _) in cells

@@ -3,7 +3,7 @@
 //! Apart from the rows because columns are found by name: makers add some, and those that are read need not stand
 //! first.
 
-use super::table::{Found, Table};
+use super::table::{Table, TableItem};
 use super::{Encoding, Pages, Seen};
 use std::io;
 
@@ -46,9 +46,9 @@ pub(crate) fn definitions(
     let mut is_whole = true;
     for _ in 0..MOST {
         match table.next(pages, seen)? {
-            Found::End => return Ok((found, is_whole)),
-            Found::LostRow { .. } | Found::LostPage { .. } => is_whole = false,
-            Found::Row { row, .. } => {
+            TableItem::End => return Ok((found, is_whole)),
+            TableItem::LostRow { .. } | TableItem::LostPage { .. } => is_whole = false,
+            TableItem::Row { row, .. } => {
                 let mut values = row;
                 let text = |value: Option<super::Value<'_>>| {
                     let text = value.and_then(super::Value::text);

@@ -3,7 +3,7 @@
 //! Apart from the tree because leaves also come from elsewhere: where a page above them is lost.
 
 use super::page::{Cell, Page};
-use super::tree::{Span, Step, Tree};
+use super::tree::{Span, Tree, TreeItem};
 use super::{Pages, Row, Seen};
 use std::collections::VecDeque;
 use std::io;
@@ -31,7 +31,7 @@ pub(crate) struct Table {
 
 /// Item that comes next.
 #[derive(Debug)]
-pub(crate) enum Found<'a> {
+pub(crate) enum TableItem<'a> {
     Row {
         page: u32,
         rowid: i64,
@@ -83,7 +83,11 @@ impl Table {
     ///
     /// # Errors
     /// Only when the input itself cannot be read.
-    pub(crate) fn next(&mut self, pages: &mut dyn Pages, seen: &mut Seen) -> io::Result<Found<'_>> {
+    pub(crate) fn next(
+        &mut self,
+        pages: &mut dyn Pages,
+        seen: &mut Seen,
+    ) -> io::Result<TableItem<'_>> {
         while self.next >= self.cells {
             if let Some(lost) = self.turn(pages, seen)? {
                 return Ok(lost);
@@ -91,7 +95,7 @@ impl Table {
         }
         let (page, nth) = (self.number, self.next);
         self.next += 1;
-        let lost = |why| Ok(Found::LostRow { page, why });
+        let lost = |why| Ok(TableItem::LostRow { page, why });
         let Ok(leaf) = Page::of(page, &self.leaf) else {
             self.cells = 0;
             return lost("its page is none of a table");
@@ -125,7 +129,7 @@ impl Table {
             }
         };
         match Row::of(bytes) {
-            Some(row) => Ok(Found::Row { page, rowid, row }),
+            Some(row) => Ok(TableItem::Row { page, rowid, row }),
             None => lost("its values do not end in it"),
         }
     }
@@ -135,21 +139,21 @@ impl Table {
         &mut self,
         pages: &mut dyn Pages,
         seen: &mut Seen,
-    ) -> io::Result<Option<Found<'static>>> {
+    ) -> io::Result<Option<TableItem<'static>>> {
         (self.next, self.cells) = (0, 0);
         self.number = match self.first.pop_front() {
             Some(number) if seen.mark(number) && pages.page(number, &mut self.leaf)? => number,
             Some(_) => return Ok(None),
             None => {
                 let Some(tree) = &mut self.tree else {
-                    return Ok(Some(Found::End));
+                    return Ok(Some(TableItem::End));
                 };
                 match tree.next(pages, seen, &mut self.leaf)? {
-                    Step::Leaf(number) => number,
-                    Step::Lost { page, why, rows } => {
-                        return Ok(Some(Found::LostPage { page, why, rows }));
+                    TreeItem::Leaf(number) => number,
+                    TreeItem::Lost { page, why, rows } => {
+                        return Ok(Some(TableItem::LostPage { page, why, rows }));
                     }
-                    Step::End => return Ok(Some(Found::End)),
+                    TreeItem::End => return Ok(Some(TableItem::End)),
                 }
             }
         };

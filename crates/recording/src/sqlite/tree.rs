@@ -36,7 +36,7 @@ struct Level {
 
 /// Step that comes next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Step {
+pub(crate) enum TreeItem {
     /// A leaf, whose bytes were copied.
     Leaf(u32),
     /// A page with these rows that cannot be used.
@@ -66,17 +66,17 @@ impl Tree {
         pages: &mut dyn Pages,
         seen: &mut Seen,
         leaf: &mut Vec<u8>,
-    ) -> io::Result<Step> {
+    ) -> io::Result<TreeItem> {
         loop {
             let (page, rows) = match self.root.take() {
                 Some(root) => (root, (i64::MIN, i64::MAX)),
                 None => match self.child() {
-                    None => return Ok(Step::End),
+                    None => return Ok(TreeItem::End),
                     Some(Ok(found)) => found,
                     Some(Err(step)) => return Ok(step),
                 },
             };
-            let lost = |why| Ok(Step::Lost { page, why, rows });
+            let lost = |why| Ok(TreeItem::Lost { page, why, rows });
             if page == 0 || page > pages.count() {
                 return lost("it is not there");
             }
@@ -92,7 +92,7 @@ impl Tree {
                 Ok(Kind::Leaf) => {
                     std::mem::swap(leaf, &mut bytes);
                     self.spare.push(bytes);
-                    return Ok(Step::Leaf(page));
+                    return Ok(TreeItem::Leaf(page));
                 }
                 Ok(Kind::Interior) if self.open.len() >= MAX_DEPTH => {
                     return lost("the tree is too deep");
@@ -108,7 +108,7 @@ impl Tree {
     }
 
     /// The next page of the innermost level that has one; `None` at the end.
-    fn child(&mut self) -> Option<Result<(u32, Span), Step>> {
+    fn child(&mut self) -> Option<Result<(u32, Span), TreeItem>> {
         loop {
             let level = self.open.last_mut()?;
             let page = Page::of(level.number, &level.bytes).ok()?;
@@ -122,7 +122,7 @@ impl Tree {
             let found = page.child(level.next);
             level.next += 1;
             let Some((child, key)) = found else {
-                return Some(Err(Step::Lost {
+                return Some(Err(TreeItem::Lost {
                     page: level.number,
                     why: "a place in it is none",
                     rows: level.rows,

@@ -25,7 +25,7 @@ pub(super) fn head(data: &[u8]) -> Option<(usize, u8)> {
 
 /// Look of a record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Look {
+pub(super) enum RecordVerdict {
     /// Body with the marks of its type.
     Whole,
     /// A message of a kind that nothing has defined.
@@ -37,12 +37,12 @@ pub(super) enum Look {
 }
 
 /// Look of the record of this type and body; `layout` is that of the messages of an id.
-pub(super) fn look(kind: u8, body: &[u8], layout: impl Fn(u16) -> Option<Layout>) -> Look {
+pub(super) fn look(kind: u8, body: &[u8], layout: impl Fn(u16) -> Option<Layout>) -> RecordVerdict {
     let whole = match kind {
         b'D' => match id(body) {
             None => false,
             Some(id) => match layout(id) {
-                None => return Look::Unknown(id),
+                None => return RecordVerdict::Unknown(id),
                 Some(layout) => (layout.least..=layout.size).contains(&(body.len() - 2)),
             },
         },
@@ -64,9 +64,13 @@ pub(super) fn look(kind: u8, body: &[u8], layout: impl Fn(u16) -> Option<Layout>
         b'P' => is_pair(body, true) && pair(body).is_some_and(|(_, value)| value.len() == 4),
         b'L' => is_said(body, 9),
         b'C' => is_said(body, 11),
-        _ => return Look::Strange,
+        _ => return RecordVerdict::Strange,
     };
-    if whole { Look::Whole } else { Look::Wrong }
+    if whole {
+        RecordVerdict::Whole
+    } else {
+        RecordVerdict::Wrong
+    }
 }
 
 /// The id a record is about.

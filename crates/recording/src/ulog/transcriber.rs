@@ -5,11 +5,11 @@
 //! looked for from which three do.
 
 use super::format::{Format, Formats, Layout};
-use super::record::{HEAD, LONGEST, Look, head, id, look, pair};
+use super::record::{HEAD, LONGEST, RecordVerdict, head, id, look, pair};
 use super::{HEADER, MAGIC};
 use crate::records::op;
 use crate::records::problem::{ProblemKind, Problems};
-use crate::records::transcript::{Step, Transcribe, Transcript};
+use crate::records::transcript::{ReadProgress, Transcribe, Transcript};
 use std::collections::BTreeMap;
 
 /// Most formats.
@@ -58,13 +58,13 @@ struct Kind {
 }
 
 impl Transcribe for Transcriber {
-    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
+    fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> ReadProgress {
         let used = match self.next(ahead, is_end, to) {
             Ok(used) => used,
-            Err(need) => return Step::Need(need),
+            Err(need) => return ReadProgress::Need(need),
         };
         self.at = self.at.saturating_add(used as u64);
-        Step::Used(used)
+        ReadProgress::Used(used)
     }
 
     fn finish(self: Box<Self>) -> (String, Problems) {
@@ -108,7 +108,7 @@ impl Transcriber {
             return Ok(ahead.len());
         };
         let found = self.look(kind, body);
-        if found != Look::Whole {
+        if found != RecordVerdict::Whole {
             // Is what follows a record?
             let rest = ahead.get(total..).unwrap_or(&[]);
             if !is_end && rest.len() < WINDOW {
@@ -121,11 +121,13 @@ impl Transcriber {
             }
         }
         match found {
-            Look::Whole => self.take(kind, body, to),
+            RecordVerdict::Whole => self.take(kind, body, to),
             // Counted by who looks up its channel.
-            Look::Unknown(id) => to.message(id, 0, self.time, body.get(2..).unwrap_or(&[])),
+            RecordVerdict::Unknown(id) => {
+                to.message(id, 0, self.time, body.get(2..).unwrap_or(&[]))
+            }
             // The format may grow; but a flipped bit makes the same of a message.
-            Look::Strange | Look::Wrong => {
+            RecordVerdict::Strange | RecordVerdict::Wrong => {
                 let length = length as u64;
                 self.fault(ProblemKind::WrongRecord { kind, length });
                 self.problems.skip(length);
@@ -149,7 +151,7 @@ impl Transcriber {
         Ok(ahead.len().min(HEADER))
     }
 
-    fn look(&self, kind: u8, body: &[u8]) -> Look {
+    fn look(&self, kind: u8, body: &[u8]) -> RecordVerdict {
         look(kind, body, |id| self.kinds.get(&id).map(|kind| kind.layout))
     }
 
@@ -167,8 +169,8 @@ impl Transcriber {
                 return if is_enough { CHAIN } else { whole };
             };
             match self.look(kind, body) {
-                Look::Whole => whole += 1,
-                Look::Unknown(_) if between < BETWEEN => between += 1,
+                RecordVerdict::Whole => whole += 1,
+                RecordVerdict::Unknown(_) if between < BETWEEN => between += 1,
                 _ => return 0,
             }
             at += total;

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::ops::Range;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Known, SensorCalibration};
+use strapd_attitude::estimate::{CalibrationTerm, SensorCalibration};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -210,9 +210,9 @@ fn truths<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<[bool; N]> {
 }
 
 /// A table of value, sigma, observed; or the value alone.
-fn known<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<Known<N>> {
+fn known<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<CalibrationTerm<N>> {
     let Some(table) = value.get_ref().as_table() else {
-        return Ok(Known {
+        return Ok(CalibrationTerm {
             value: numbers(name, value)?,
             sigma: None,
             observed: [false; N],
@@ -232,7 +232,7 @@ fn known<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<Known<N>> {
     let Some(numbers) = numbers_of else {
         return wrong(&value.span(), format!("`{name}`: `value` is missing"));
     };
-    Ok(Known {
+    Ok(CalibrationTerm {
         value: numbers,
         sigma,
         observed: observed.unwrap_or([sigma.is_some(); N]),
@@ -274,7 +274,12 @@ pub fn text_of(known: &SensorCalibration) -> String {
     out
 }
 
-fn section<const N: usize>(out: &mut String, key: &str, what: &str, known: &Option<Known<N>>) {
+fn section<const N: usize>(
+    out: &mut String,
+    key: &str,
+    what: &str,
+    known: &Option<CalibrationTerm<N>>,
+) {
     let Some(known) = known else { return };
     let _ = writeln!(out, "\n[{key}]  # {what}");
     let _ = writeln!(

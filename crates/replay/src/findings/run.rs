@@ -6,7 +6,7 @@ use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
 use strapd_attitude::consistency::Consistency;
-use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::estimate::{EstimationSettings, Meaning};
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
@@ -38,7 +38,7 @@ pub(crate) struct Noted<'a> {
     /// Frames of other bodies on the topic, and how many messages named them.
     pub(crate) left_out: &'a [(String, u64)],
     /// Gyro held against accelerometer, with what the samples were taken for.
-    pub(crate) gyro: Option<(&'a Consistency, &'a Plan, &'a Meaning)>,
+    pub(crate) gyro: Option<(&'a Consistency, &'a EstimationSettings, &'a Meaning)>,
     /// Orientations that were compared with; `None` where none were to be.
     pub(crate) references: Option<u64>,
 }

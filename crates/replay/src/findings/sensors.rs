@@ -7,7 +7,7 @@ use super::{Finding, Severity};
 use crate::summary::significant;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::consistency::{Cause, Consistency, Disagreement};
-use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::estimate::{EstimationSettings, Meaning};
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 
@@ -49,7 +49,7 @@ struct Named {
 
 /// Finding that gyro and accelerometer speak of different bodies.
 pub(super) fn disagreement(
-    (consistency, plan, resolved): (&Consistency, &Plan, &Meaning),
+    (consistency, plan, resolved): (&Consistency, &EstimationSettings, &Meaning),
 ) -> Option<Finding> {
     let found = consistency.disagreement()?;
     let finding = match found.cause {
@@ -76,7 +76,11 @@ pub(super) fn disagreement(
     )
 }
 
-fn of_axes(found: &Disagreement, (map, decided): (AxisMap, [bool; 3]), plan: &Plan) -> Finding {
+fn of_axes(
+    found: &Disagreement,
+    (map, decided): (AxisMap, [bool; 3]),
+    plan: &EstimationSettings,
+) -> Finding {
     let names = map.to_string();
     let turned: Vec<String> = ["x", "y", "z"]
         .into_iter()
@@ -111,7 +115,7 @@ fn of_axes(found: &Disagreement, (map, decided): (AxisMap, [bool; 3]), plan: &Pl
 fn of_scale(
     (found, consistency): (&Disagreement, &Consistency),
     (factor, sigma): (f64, f64),
-    (plan, unit): (&Plan, GyroUnit),
+    (plan, unit): (&EstimationSettings, GyroUnit),
 ) -> Finding {
     let is_known = sigma < KNOWN;
     let times = match is_known {
@@ -163,7 +167,7 @@ fn of_scale(
 }
 
 /// Factors that rates are off by, other than by accident.
-fn named(plan: &Plan, taken: GyroUnit) -> Vec<Named> {
+fn named(plan: &EstimationSettings, taken: GyroUnit) -> Vec<Named> {
     let mut all = Vec::new();
     if plan.gyro_scale == [1.0; 3] {
         let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad];
@@ -197,7 +201,7 @@ fn named(plan: &Plan, taken: GyroUnit) -> Vec<Named> {
 }
 
 /// Scale that is so many times that of the plan.
-fn scaled(plan: &Plan, factor: f64) -> Choice {
+fn scaled(plan: &EstimationSettings, factor: f64) -> Choice {
     let factors = plan.gyro_scale.map(|own| significant(own * factor, 4));
     let [x, y, z] = &factors;
     GYRO_SCALE.to(match x == y && y == z {

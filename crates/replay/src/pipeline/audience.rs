@@ -10,7 +10,7 @@ use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// Instruction for the next items of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
+pub struct Grant {
     /// Number of items that are due.
     pub count: usize,
     /// Whether they are shown; those before a place that was sought are not.
@@ -27,7 +27,7 @@ pub trait Audience: Debug + Send + Sync {
 
     /// Waits until the first of `count` items, which are due at `due` of their number, is due. `None`: the
     /// run is to end.
-    fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<Turn>;
+    fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<Grant>;
 
     /// Attitudes of a stream.
     fn attitudes(&self, stream: usize, samples: &[AttitudeSample], is_shown: bool);

@@ -17,7 +17,7 @@ use strapd_recording::Recording;
 use strapd_recording::decode::Decoder;
 use strapd_recording::mcap::Channel;
 use strapd_recording::recording::beside::{self, AuxiliaryInputs};
-use strapd_recording::recording::channel_route::{Noticed, Route, RouteTarget};
+use strapd_recording::recording::channel_route::{PayloadNotes, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, rank};
 use strapd_recording::recording::sources::{Publisher, is_same};
@@ -84,7 +84,7 @@ fn choose_one<'l>(
         output_topic: topic,
         described: first.read_as(),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),
-        noticed: Arc::new(Noticed::of(&plan.source)),
+        noticed: Arc::new(PayloadNotes::of(&plan.source)),
         warnings: plan
             .refusals
             .iter()
@@ -237,7 +237,7 @@ pub(super) fn looked_at(
 ) -> Option<Route> {
     let beside = besides.and_then(|besides| besides.decoder(channel).cloned());
     let samples = to_streams(chosen, channel, |chosen| {
-        Arc::new(Noticed::of(&chosen.plan.source))
+        Arc::new(PayloadNotes::of(&chosen.plan.source))
     });
     match samples {
         Some(samples) => Some(samples.beside(beside)),
@@ -248,7 +248,7 @@ pub(super) fn looked_at(
 fn to_streams(
     chosen: &[RunTopic<'_>],
     channel: &Channel,
-    noticed: impl Fn(&RunTopic<'_>) -> Arc<Noticed>,
+    noticed: impl Fn(&RunTopic<'_>) -> Arc<PayloadNotes>,
 ) -> Option<Route> {
     let plans = chosen.iter().map(|c| &c.plan);
     topic_plan::route(plans, channel, |stream, _| RouteTarget {

@@ -4,15 +4,15 @@
 //! gaps and turns per step is what a replay would do, and not another program's opinion.
 
 use super::attitude_track::Track;
-use super::each::each;
 use super::inspection::look_as;
 use super::position::Position;
+use super::replay_topics::each;
 use super::request::ReplayRequest;
 use super::summarise::TopicOutcome;
 use crate::error::Result;
 use crate::findings::no_topic;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_recording::Input;
 use strapd_recording::Recording;
 use strapd_recording::Selection;
@@ -35,7 +35,7 @@ pub struct Examination<'a> {
     /// Selection; its topic is the only one looked at.
     pub selection: Selection,
     /// Settings by which samples are understood and integrated.
-    pub plan: Plan,
+    pub plan: EstimationSettings,
     /// The topic of the reference in the log, empty = found.
     pub reference_topic: String,
     /// Series to draw of the replays.
@@ -60,9 +60,9 @@ pub fn check(
             decode: options.clone(),
             ..Selection::default()
         },
-        plan: Plan {
+        plan: EstimationSettings {
             aid: Aid::Auto,
-            ..Plan::default()
+            ..EstimationSettings::default()
         },
         reference_topic: String::new(),
         drawing: None,

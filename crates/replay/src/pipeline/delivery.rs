@@ -1,6 +1,6 @@
 //! Attitudes of every stream -> every sink of the run. I/O.
 
-use super::audience::{Audience, Turn};
+use super::audience::{Audience, Grant};
 use super::pace::Pace;
 use crate::error::Result;
 use crate::sink::{
@@ -188,7 +188,7 @@ impl Outlet {
                         pace.wait((way.due)(first));
                         pace.take(rest.iter().map(way.due))
                     });
-                    Turn {
+                    Grant {
                         count,
                         is_shown: true,
                     }

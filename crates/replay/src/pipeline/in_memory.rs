@@ -3,7 +3,7 @@
 //! The same run as into a file, with somebody who takes what it makes in the place of an output: the same samples, in
 //! the same order, to the bit.
 
-use super::audience::{Audience, Turn};
+use super::audience::{Audience, Grant};
 use super::replay::run;
 use super::request::ReplayRequest;
 use crate::error::Result;
@@ -61,7 +61,7 @@ impl ReplayRequest {
         pool: &Pool,
         take: impl FnMut(&[Stream], usize, &[AttitudeSample]) -> ControlFlow<()> + Send + 'static,
     ) -> Result<RunSummary> {
-        let taker = Taker {
+        let taker = AttitudeCollector {
             streams: Mutex::default(),
             take: Mutex::new(take),
             has_enough: AtomicBool::new(false),
@@ -73,20 +73,20 @@ impl ReplayRequest {
 }
 
 /// Whoever takes the attitudes of a run, as its audience: nothing is paced, and it may have enough.
-struct Taker<F> {
+struct AttitudeCollector<F> {
     streams: Mutex<Vec<Stream>>,
     take: Mutex<F>,
     has_enough: AtomicBool,
 }
 
-impl<F> fmt::Debug for Taker<F> {
+impl<F> fmt::Debug for AttitudeCollector<F> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Taker").finish_non_exhaustive()
     }
 }
 
 impl<F: FnMut(&[Stream], usize, &[AttitudeSample]) -> ControlFlow<()> + Send> Audience
-    for Taker<F>
+    for AttitudeCollector<F>
 {
     fn begin(&self, streams: &[Stream]) {
         *self.streams.lock().unwrap_or_else(PoisonError::into_inner) = streams.to_vec();
@@ -94,8 +94,8 @@ impl<F: FnMut(&[Stream], usize, &[AttitudeSample]) -> ControlFlow<()> + Send> Au
 
     fn length(&self, _secs: f64) {}
 
-    fn turn(&self, count: usize, _due: &dyn Fn(usize) -> Nanos) -> Option<Turn> {
-        (!self.has_enough.load(Ordering::Relaxed)).then_some(Turn {
+    fn turn(&self, count: usize, _due: &dyn Fn(usize) -> Nanos) -> Option<Grant> {
+        (!self.has_enough.load(Ordering::Relaxed)).then_some(Grant {
             count,
             is_shown: true,
         })

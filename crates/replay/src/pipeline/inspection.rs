@@ -11,14 +11,14 @@ use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Stillness};
 use strapd_attitude::condition::{Clock, GyroUnit, choose_clock_as};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{ClockPass, Conditioned, FEW, Meaning, Plan};
+use strapd_attitude::estimate::{ClockPass, Conditioned, EstimationSettings, FEW, Meaning};
 use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
 use strapd_recording::decode::Options;
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::Vectors;
-use strapd_recording::recording::channel_route::{Item, Noticed, RouteTarget};
+use strapd_recording::recording::channel_route::{Item, PayloadNotes, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::recording::opened::AHEAD;
@@ -58,7 +58,7 @@ struct TopicInspector {
     stamps: regularise::Survey,
     clocks: Option<ClockPass>,
     undecodable: u64,
-    plan: Plan,
+    plan: EstimationSettings,
     aid: Aids,
 }
 
@@ -71,7 +71,7 @@ struct Si {
 }
 
 impl Si {
-    fn new(plan: &Plan, declared: &Declared, resolved: &Meaning) -> Si {
+    fn new(plan: &EstimationSettings, declared: &Declared, resolved: &Meaning) -> Si {
         let stated = declared.gyro_unit.filter(|_| plan.unit.is_none());
         Si {
             rate: stated.map_or(1.0, GyroUnit::to_rad),
@@ -180,7 +180,7 @@ pub fn look(
     options: &Options,
     pool: &Pool,
 ) -> Result<LogInspection> {
-    look_as(log, named, (options, &Plan::default()), pool)
+    look_as(log, named, (options, &EstimationSettings::default()), pool)
 }
 
 /// The same with the samples understood as a run of `plan` understands them.
@@ -190,15 +190,15 @@ pub fn look(
 pub(crate) fn look_as(
     log: &Recording,
     named: Option<&str>,
-    (options, plan): (&Options, &Plan),
+    (options, plan): (&Options, &EstimationSettings),
     pool: &Pool,
 ) -> Result<LogInspection> {
     let path = log.name();
     let (wanted, left_out) = wanted(log, named);
     let unsupported = |what: Diagnostic| Error::unsupported(path, what);
     let (mut looks, plans) = begin_all(log, wanted, named.is_some(), (options, plan))?;
-    let noticed = |source: &Publisher| Arc::new(Noticed::of(source));
-    let noticed: Vec<Arc<Noticed>> = plans.iter().map(|of| noticed(&of.source)).collect();
+    let noticed = |source: &Publisher| Arc::new(PayloadNotes::of(source));
+    let noticed: Vec<Arc<PayloadNotes>> = plans.iter().map(|of| noticed(&of.source)).collect();
     let survey = log.walk::<Error>(
         AHEAD,
         pool,
@@ -244,7 +244,7 @@ fn begin_all<'l>(
     log: &'l Recording,
     wanted: Vec<(&'l Publisher, bool)>,
     asked: bool,
-    (options, plan): (&Options, &Plan),
+    (options, plan): (&Options, &EstimationSettings),
 ) -> Result<(Vec<TopicInspector>, Vec<TopicPlan<'l>>)> {
     let mut decoders = Decoders::of_run(plan, options);
     let (mut looks, mut plans) = (Vec::new(), Vec::new());
@@ -323,7 +323,7 @@ fn wanted<'l>(
     )
 }
 
-fn begin(of_topic: &TopicPlan<'_>, plan: &Plan) -> Option<TopicInspector> {
+fn begin(of_topic: &TopicPlan<'_>, plan: &EstimationSettings) -> Option<TopicInspector> {
     let (known, decoder) = of_topic.channels.first()?;
     let resolved = Meaning::new(plan, &decoder.stated().declared);
     Some(TopicInspector {

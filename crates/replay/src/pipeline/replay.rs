@@ -9,7 +9,7 @@ use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
 use super::session_builder::begin;
 use super::summarise;
-use super::{logged, replay_stream};
+use super::{opening, replay_stream};
 use crate::error::{Error, Result};
 use crate::sink::Flow;
 use crate::summary::{RunSummary, human_bytes};
@@ -47,12 +47,12 @@ pub fn run(
         Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
         Source::File(_) | Source::Elsewhere(_) => {
             let input = match &run.source {
-                Source::Elsewhere(address) => logged::elsewhere(address)?,
-                source => logged::open(&source.name())?,
+                Source::Elsewhere(address) => opening::elsewhere(address)?,
+                source => opening::open(&source.name())?,
             };
             file(run, &input, pool, watch)?
         }
-        Source::Parts(paths) => file(run, &logged::joined(paths)?, pool, watch)?,
+        Source::Parts(paths) => file(run, &opening::joined(paths)?, pool, watch)?,
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
@@ -69,10 +69,10 @@ fn piped(
     let name = run.source.name();
     if run.selection.topic.as_deref() == Some("all") {
         // Which topics there are is known at the end of a stream alone.
-        let input = Input::of_stream(&name, input, &logged::warn())?;
+        let input = Input::of_stream(&name, input, &opening::warn())?;
         return file(run, &input, pool, watch);
     }
-    match incoming(&name, input, &run.selection.decode, &logged::warn())? {
+    match incoming(&name, input, &run.selection.decode, &opening::warn())? {
         Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
         Incoming::Lines(lines) => replay_stream::replay_lines(run, *lines, pool, watch),
         Incoming::Whole(input) => file(run, &input, pool, watch),

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_recording::decode::Options;
 use strapd_recording::{Error, Selection, Source};
 
@@ -21,7 +21,7 @@ pub struct ReplayRequest {
     /// Selection of samples.
     pub selection: Selection,
     /// Settings by which samples are understood and integrated.
-    pub plan: Plan,
+    pub plan: EstimationSettings,
     /// Options by which outputs are made.
     pub options: sink::Options,
     /// Whether every message of the input is copied to MCAP outputs.
@@ -48,7 +48,7 @@ impl ReplayRequest {
             source,
             targets: Vec::new(),
             selection: Selection::default(),
-            plan: Plan::default(),
+            plan: EstimationSettings::default(),
             options: sink::Options::default(),
             copy_input: false,
             out_rate: None,

@@ -9,12 +9,12 @@ use crate::summary::trace::Traces;
 use crate::summary::{Against, Recorded};
 use std::collections::HashMap;
 use strapd_attitude::compare::{
-    Align, Consistency, Known, Reference, Stamped, compare, consistency, fit_body_axes,
+    Align, Consistency, Reference, Stamped, UncertainAttitude, compare, consistency, fit_body_axes,
     fit_constant_bias, for_each_error,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Initial, Meaning, Plan, Prepared};
+use strapd_attitude::estimate::{EstimationSettings, Initial, Meaning, Prepared};
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status};
@@ -66,7 +66,7 @@ pub(super) struct AgainstRecorded {
     resets: Option<u8>,
     cuts: Vec<Nanos>,
     /// Attitudes that the run itself put out, in the world it was asked for, with their stated error.
-    own: Thinned<Known>,
+    own: Thinned<UncertainAttitude>,
     world: World,
     /// Alignment of its world to the reference's, by what it claims of it.
     align: Align,
@@ -135,7 +135,7 @@ impl AgainstRecorded {
     /// # Errors
     /// In words: settings that cannot be.
     pub(super) fn new(
-        plan: &Plan,
+        plan: &EstimationSettings,
         resolved: &Meaning,
         prepared: &Prepared,
     ) -> Result<Self, Diagnostic> {
@@ -155,7 +155,7 @@ impl AgainstRecorded {
         let estimators = MEANINGS
             .iter()
             .map(|(_, _, kind, method)| {
-                let plan = Plan {
+                let plan = EstimationSettings {
                     method: method.unwrap_or(plan.method),
                     ..plan.clone()
                 };
@@ -198,7 +198,7 @@ impl AgainstRecorded {
         let from = self.world.convention().unwrap_or(Convention::EnuFlu);
         for sample in samples {
             let turned = |v| from.convert_body(Convention::EnuFlu, v);
-            self.own.push(Known {
+            self.own.push(UncertainAttitude {
                 stamp: sample.stamp,
                 q_nb: from.convert(Convention::EnuFlu, sample.q_nb),
                 covariance: match from {

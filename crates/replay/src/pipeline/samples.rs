@@ -13,7 +13,9 @@ use crate::summary::TopicSummary;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Estimator, Meaning, Patience, Plan, Prepared, learned};
+use strapd_attitude::estimate::{
+    EstimationSettings, Estimator, Meaning, Patience, Prepared, learned,
+};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, RawSample};
 use strapd_recording::Source;
@@ -51,7 +53,7 @@ impl<E> From<Error> for Stop<E> {
 /// # Errors
 /// Samples or settings do not allow it; those of `take`.
 pub fn estimate<E>(
-    plan: &Plan,
+    plan: &EstimationSettings,
     samples: impl Iterator<Item = RawSample> + Clone,
     mut take: impl FnMut(&[AttitudeSample]) -> Result<(), E>,
 ) -> Result<TopicSummary, Stop<E>> {
@@ -136,7 +138,7 @@ fn prepare<E>(
 /// attitudes, of which `last` is the newest.
 #[must_use]
 pub fn so_far(
-    of: (&Plan, &Meaning, &Prepared),
+    of: (&EstimationSettings, &Meaning, &Prepared),
     estimator: &Estimator,
     written: u64,
     last: Option<&AttitudeSample>,
@@ -193,11 +195,11 @@ mod tests {
             .collect()
     }
 
-    fn whole(plan: &Plan) -> TopicSummary {
+    fn whole(plan: &EstimationSettings) -> TopicSummary {
         estimate(plan, raw().into_iter(), |_| Ok::<(), ()>(())).unwrap()
     }
 
-    fn live(plan: &Plan) -> TopicSummary {
+    fn live(plan: &EstimationSettings) -> TopicSummary {
         let raw = raw();
         let meaning = Meaning::new(plan, &Declared::default());
         let prepared = at_once(plan, &meaning, raw.get(..1).unwrap()).unwrap();
@@ -215,15 +217,15 @@ mod tests {
 
     #[test]
     fn samples_that_still_come_have_every_key_of_a_replay_and_no_other() {
-        let alone = Plan::default();
-        let aided = Plan {
+        let alone = EstimationSettings::default();
+        let aided = EstimationSettings {
             aid: Aid::Auto,
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         assert_eq!(keys_of(&live(&aided)), keys_of(&whole(&aided)));
         assert_eq!(keys_of(&live(&alone)), keys_of(&whole(&alone)));
         assert_ne!(keys_of(&live(&alone)), keys_of(&whole(&aided)));
-        let cut = Plan {
+        let cut = EstimationSettings {
             truncation: Truncation::Steps(0.001),
             ..aided.clone()
         };

@@ -15,12 +15,12 @@ use std::sync::Arc;
 use strapd_attitude::condition::Histogram;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
-use strapd_recording::recording::channel_route::{Item, Noticed};
+use strapd_recording::recording::channel_route::{Item, PayloadNotes};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// One estimated topic of a run.
@@ -37,7 +37,7 @@ pub(super) struct Topic {
     /// Decisions made before the first was integrated.
     pub prepared: Prepared,
     /// Observations in its payloads.
-    pub noticed: Arc<Noticed>,
+    pub noticed: Arc<PayloadNotes>,
     /// Things to know, beside those of `prepared`.
     pub warnings: Vec<Diagnostic>,
     /// Estimator.
@@ -134,7 +134,7 @@ impl Topic {
     /// [`strapd_recording::Error::Topic`] when the settings do not fit it.
     pub(super) fn new(
         path: &Path,
-        plan: &Plan,
+        plan: &EstimationSettings,
         found: TopicInfo,
         prepared: Prepared,
         against: bool,
@@ -229,7 +229,7 @@ pub(super) struct TopicInfo {
     /// Meaning of its samples.
     pub resolved: Meaning,
     /// Observations in its payloads.
-    pub noticed: Arc<Noticed>,
+    pub noticed: Arc<PayloadNotes>,
     /// Things to know.
     pub warnings: Vec<Diagnostic>,
 }

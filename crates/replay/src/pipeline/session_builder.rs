@@ -10,13 +10,13 @@ use super::session::{Session, Topic, TopicInfo};
 use crate::error::Result;
 use crate::sink::Stream;
 use std::path::Path;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::estimate::{Meaning, Prepared};
 
 /// The output's labels: frames and axes as they will be in the numbers.
 pub fn labelled(
     mut stream: Stream,
-    plan: &Plan,
+    plan: &EstimationSettings,
     resolved: &Meaning,
     prepared: &Prepared,
 ) -> Stream {

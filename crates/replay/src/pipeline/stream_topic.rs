@@ -20,9 +20,9 @@ use strapd_recording::TopicBeside;
 use strapd_recording::decode::{Decoder, Wanted};
 use strapd_recording::mcap::{Channel, Survey};
 use strapd_recording::recording::beside;
-use strapd_recording::recording::channel_route::{Item, Noticed, Route, RouteTarget};
+use strapd_recording::recording::channel_route::{Item, PayloadNotes, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
-use strapd_recording::recording::held::Held;
+use strapd_recording::recording::held::HeldChannel;
 use strapd_recording::recording::log_channel::{LogChannel, described, known, rank};
 use strapd_recording::recording::log_topics::explained;
 use strapd_recording::recording::payload_type::PayloadType;
@@ -37,14 +37,14 @@ pub(super) struct StreamTopic<'r> {
     notes: Vec<Diagnostic>,
     topic: Option<String>,
     publisher: String,
-    noticed: Arc<Noticed>,
+    noticed: Arc<PayloadNotes>,
     /// Channels of the topic so far.
     channels: usize,
     found: Option<(TopicInfo, Stream)>,
     /// Whether there is or was such a find.
     is_met: bool,
     /// Channels of the topic whose first messages tell how to read them.
-    held: Vec<Held>,
+    held: Vec<HeldChannel>,
     others: BTreeSet<String>,
     /// Topic of the magnetic field, where no flag names it.
     field_topic: Option<String>,
@@ -106,7 +106,7 @@ impl<'r> StreamTopic<'r> {
                 };
                 self.channels += 1;
                 if decoder.has_bare_stamps() {
-                    let held = Held::new(channel, decoder, taker, self.channels, copied);
+                    let held = HeldChannel::new(channel, decoder, taker, self.channels, copied);
                     let route = held.route();
                     self.held.push(held);
                     return Some(route);

@@ -7,7 +7,7 @@ use super::session::Topic;
 use crate::summary::aid::Frozen;
 use nalgebra::Vector3;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::record::{Nanos, SampleKind, Verdict};
 use strapd_attitude::setting::{ACCEL_TOPIC, AID, FIELD, MAG_TOPIC, START, UNTIL};
 
@@ -21,7 +21,7 @@ const REPEATED: i64 = 2_000_000_000;
 const STEP: i64 = 500_000_000;
 
 /// Why a topic has not what was asked for; `None` where it has, or gave no attitude at all for other reasons.
-pub(super) fn unmet(plan: &Plan, topic: &Topic) -> Option<Diagnostic> {
+pub(super) fn unmet(plan: &EstimationSettings, topic: &Topic) -> Option<Diagnostic> {
     let counts = topic.estimator.conditioning().counts;
     let total = counts.total();
     if is_outside(topic) {

@@ -9,7 +9,7 @@ use crate::sink::upload;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
-use strapd_recording::elsewhere::SCHEMES;
+use strapd_recording::remote_object::SCHEMES;
 
 /// Target of the output.
 #[derive(Clone, PartialEq, Eq, Debug)]

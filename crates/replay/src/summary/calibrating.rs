@@ -5,7 +5,7 @@ use super::{TopicSummary, significant};
 use crate::finding::Finding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use strapd_attitude::estimate::{Known, Pooled, SensorCalibration};
+use strapd_attitude::estimate::{CalibrationTerm, Pooled, SensorCalibration};
 
 /// One recording's part in a calibration.
 #[derive(Clone, Debug)]
@@ -133,7 +133,7 @@ impl Calibrating {
     /// Motions that would show what is not known yet.
     #[must_use]
     pub fn missing(&self) -> Vec<String> {
-        fn unknown<const N: usize>(known: &Option<Known<N>>) -> Vec<usize> {
+        fn unknown<const N: usize>(known: &Option<CalibrationTerm<N>>) -> Vec<usize> {
             let is_known = |i: &usize| {
                 known
                     .as_ref()
@@ -246,7 +246,7 @@ impl Row {
 fn rows(known: &SensorCalibration) -> Vec<Row> {
     fn row<const N: usize>(
         (name, unit): (&'static str, &'static str),
-        known: &Option<Known<N>>,
+        known: &Option<CalibrationTerm<N>>,
         factor: f64,
         places: &[usize],
     ) -> Option<Row> {

@@ -1,7 +1,7 @@
 //! Facts about a sensor at the end of a run -> its calibration as it is saved, and words. Pure.
 
 use super::calendar::date;
-use strapd_attitude::estimate::{Known, SensorCalibration};
+use strapd_attitude::estimate::{CalibrationTerm, SensorCalibration};
 use strapd_attitude::record::AttitudeSample;
 
 /// Recordings that are named.
@@ -53,7 +53,7 @@ pub fn observed(known: &SensorCalibration) -> String {
 /// The keys of those numbers.
 #[must_use]
 pub fn names(known: &SensorCalibration) -> Vec<String> {
-    fn of<const N: usize>(key: &'static str, known: &Option<Known<N>>) -> Option<String> {
+    fn of<const N: usize>(key: &'static str, known: &Option<CalibrationTerm<N>>) -> Option<String> {
         let known = known.as_ref()?;
         match known.observed.iter().filter(|o| **o).count() {
             0 => None,

@@ -7,7 +7,7 @@ use super::significant;
 use nalgebra::Matrix3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::Settings;
-use strapd_attitude::estimate::{Bias, Initial, Plan, Prepared};
+use strapd_attitude::estimate::{Bias, EstimationSettings, Initial, Prepared};
 use strapd_attitude::setting::{BIAS, CALIBRATION, INIT, NOISE};
 
 /// One thing that is not known.
@@ -39,7 +39,7 @@ fn per_hour(v: f64) -> f64 {
 impl SigmaTerms {
     /// Makes them of a run as planned and prepared; `bridged` gaps were integrated across.
     #[must_use]
-    pub fn of(plan: &Plan, prepared: &Prepared, bridged: u64) -> SigmaTerms {
+    pub fn of(plan: &EstimationSettings, prepared: &Prepared, bridged: u64) -> SigmaTerms {
         let mut terms = match &prepared.aiding {
             Some(aiding) => filtered(&aiding.settings),
             None => alone(plan, prepared.bias_sigma.into(), prepared.tilt_sigma),
@@ -88,7 +88,7 @@ impl SigmaTerms {
 }
 
 /// Terms of the gyro alone.
-fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
+fn alone(plan: &EstimationSettings, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
     let known = plan.calibration.as_deref();
     let noise = &known.map_or_else(|| plan.noise.clone(), |known| known.narrowed(&plan.noise));
     let (turn_on, note) = match plan.bias {
@@ -296,7 +296,7 @@ mod tests {
     use super::*;
     use strapd_attitude::estimate::Noise;
 
-    fn words(plan: &Plan) -> String {
+    fn words(plan: &EstimationSettings) -> String {
         let terms = alone(plan, [0.0; 3], 0.0);
         let terms = SigmaTerms {
             is_filtered: false,
@@ -308,9 +308,9 @@ mod tests {
 
     #[test]
     fn what_bias_and_init_leave_is_said_and_what_is_nothing_is_not() {
-        let plan = Plan {
+        let plan = EstimationSettings {
             noise: Noise::named("consumer").unwrap(),
-            ..Plan::default()
+            ..EstimationSettings::default()
         };
         let said = words(&plan);
         assert!(said.contains("class consumer, noise"), "{said}");
@@ -322,7 +322,7 @@ mod tests {
             said.contains("flicker 8.5 deg/h") && !said.contains("initial"),
             "{said}"
         );
-        let removed = Plan {
+        let removed = EstimationSettings {
             bias: Bias::Auto,
             initial: Initial::Gravity,
             ..plan.clone()

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::setting::{NOISE, RATE_HZ, START_STAMP};
-use strapd_bodies::synthetic::Noticed;
+use strapd_bodies::synthetic::GenerationCounts;
 
 /// Summary of a simulation.
 #[derive(Clone, Debug)]
@@ -13,7 +13,7 @@ pub struct SimulationSummary {
     /// The motion.
     pub name: String,
     /// Counts.
-    pub noticed: Noticed,
+    pub noticed: GenerationCounts,
     /// Kind of a sample.
     pub kind: SampleKind,
     /// Samples a second.

@@ -5,7 +5,7 @@ use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
 use strapd_attitude::setting::{NOISE, SAMPLE_KIND, SMOOTH};
-use strapd_attitude::smooth::{Bias, Calibration, Counts, Held, Learned, Outcome, Sizes};
+use strapd_attitude::smooth::{Bias, Calibration, Counts, Estimated, HeldBias, Outcome, Sizes};
 
 /// A recording that was smoothed.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct Smoothing {
     has_north: bool,
     bound: [f64; 2],
     /// The bias that no motion told.
-    held: Option<Held>,
+    held: Option<HeldBias>,
     is_taken_as_mean: bool,
     is_beyond_class: bool,
     spooled_bytes: u64,
@@ -328,7 +328,7 @@ impl Smoothing {
     /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
-        fn numbers<const N: usize>(learned: &Learned<N>) -> Value {
+        fn numbers<const N: usize>(learned: &Estimated<N>) -> Value {
             let observed: Vec<bool> = (0..N).map(|i| learned.is_observed(i)).collect();
             json!({
                 "value": learned.value.as_slice(), "sigma": learned.sigma.as_slice(),
@@ -380,7 +380,7 @@ impl Smoothing {
 /// Some numbers of what was learned, and what was known of them, times `factor`.
 fn row<const N: usize, const M: usize>(
     name: &str,
-    learned: &Learned<N>,
+    learned: &Estimated<N>,
     of: [usize; M],
     factor: f64,
 ) -> Vec<String> {
@@ -408,7 +408,7 @@ fn row<const N: usize, const M: usize>(
 }
 
 /// A matrix: its diagonal, and the turns of axes above and below it.
-fn matrix(name: &str, learned: &Learned<9>, rows: &mut Vec<Vec<String>>) {
+fn matrix(name: &str, learned: &Estimated<9>, rows: &mut Vec<Vec<String>>) {
     let degrees = 1f64.to_degrees();
     rows.push(row(&format!("{name} scale, %"), learned, [0, 4, 8], 100.0));
     rows.push(row(
@@ -425,7 +425,7 @@ fn matrix(name: &str, learned: &Learned<9>, rows: &mut Vec<Vec<String>>) {
     ));
 }
 
-fn part<const N: usize>(name: &str, learned: Option<&Learned<N>>) -> Option<String> {
+fn part<const N: usize>(name: &str, learned: Option<&Estimated<N>>) -> Option<String> {
     let learned = learned?;
     match (0..N).filter(|i| !learned.is_observed(*i)).count() {
         0 => None,
@@ -435,7 +435,7 @@ fn part<const N: usize>(name: &str, learned: Option<&Learned<N>>) -> Option<Stri
 }
 
 /// The diagonal of a matrix, %, and its sigma.
-fn scales(learned: &Learned<9>) -> ([f64; 3], [f64; 3]) {
+fn scales(learned: &Estimated<9>) -> ([f64; 3], [f64; 3]) {
     let of = |numbers: &[f64; 9]| [0, 4, 8].map(|i| numbers.get(i).map_or(0.0, |v| v * 100.0));
     (of(&learned.value), of(&learned.sigma))
 }

@@ -17,7 +17,9 @@ use crate::finding::{Finding, Severity};
 use serde_json::{Map, Value, json};
 use strapd_attitude::condition::{ClockSet, Wraps};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Estimator, Meaning, Plan, Prepared, SensorCalibration, learned};
+use strapd_attitude::estimate::{
+    EstimationSettings, Estimator, Meaning, Prepared, SensorCalibration, learned,
+};
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
@@ -125,7 +127,7 @@ impl TopicSummary {
     /// a topic are left empty.
     #[must_use]
     pub fn of(
-        (plan, resolved, prepared): (&Plan, &Meaning, &Prepared),
+        (plan, resolved, prepared): (&EstimationSettings, &Meaning, &Prepared),
         estimator: &Estimator,
         last: Option<&AttitudeSample>,
     ) -> TopicSummary {
@@ -474,7 +476,7 @@ impl TopicSummary {
 }
 
 /// Maps and factors of single sensors that differ from nothing.
-fn sensor_maps(plan: &Plan) -> Option<String> {
+fn sensor_maps(plan: &EstimationSettings) -> Option<String> {
     let axes = [
         (GYRO_AXES, plan.gyro_axes),
         (ACCEL_AXES, plan.accel_axes),

@@ -6,7 +6,7 @@
 //! [`LAPSED`], which is longer, takes over. No clock of one machine is held against another's.
 
 use super::connection::in_words;
-use super::tenure::{Tenancy, Tenure};
+use super::tenure::{LeaseState, LeaseWatch};
 use crate::serve::core::state::{FORMAT, Sensors};
 use crate::serve::guard::log_throttle;
 use async_nats::jetstream::kv::{CreateErrorKind, Operation, Store, UpdateErrorKind};
@@ -73,7 +73,7 @@ impl Lease {
         store: Store,
         key: &str,
         worker: &str,
-        tenancy: &Tenancy,
+        tenancy: &LeaseWatch,
     ) -> Result<(Lease, Document), String> {
         let number = tenancy.now().number() + 1;
         let mut seen: Option<(u64, Instant)> = None;
@@ -121,7 +121,7 @@ impl Lease {
             };
             // Somebody else was faster.
             let Some(revision) = taken else { continue };
-            tenancy.set(Tenure::Held {
+            tenancy.set(LeaseState::Held {
                 number,
                 until: before + HELD,
             });
@@ -149,19 +149,19 @@ impl Lease {
     }
 
     /// Writes it again and again, until somebody else has: then says who.
-    pub(super) async fn keep(self: Arc<Lease>, tenancy: Arc<Tenancy>) -> String {
+    pub(super) async fn keep(self: Arc<Lease>, tenancy: Arc<LeaseWatch>) -> String {
         let mut tick = interval(EVERY);
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tick.tick().await;
             let before = Instant::now();
             match self.write(false).await {
-                Ok(()) => tenancy.set(Tenure::Held {
+                Ok(()) => tenancy.set(LeaseState::Held {
                     number: self.number,
                     until: before + HELD,
                 }),
                 Err(Refused::Other(who)) => {
-                    tenancy.set(Tenure::None {
+                    tenancy.set(LeaseState::None {
                         number: self.number,
                     });
                     return format!("{} has {} now", who, self.key);
@@ -178,12 +178,12 @@ impl Lease {
     }
 
     /// Lets it go, so that another need not wait.
-    pub(super) async fn release(&self, tenancy: &Tenancy) {
+    pub(super) async fn release(&self, tenancy: &LeaseWatch) {
         // Twice: the answer to the write before may be lost. Whatever comes of it, it lapses.
         if self.write(true).await.is_err() {
             let _ = self.write(true).await;
         }
-        tenancy.set(Tenure::None {
+        tenancy.set(LeaseState::None {
             number: self.number,
         });
     }

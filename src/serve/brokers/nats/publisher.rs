@@ -2,7 +2,7 @@
 
 use super::address::NatsAddress;
 use super::connection::{in_words, keep_connecting};
-use super::tenure::{Tenancy, Tenure};
+use super::tenure::{LeaseState, LeaseWatch};
 use crate::serve::brokers::{Batch, TAKE, gathered, warn};
 use crate::serve::core::context::Context;
 use crate::serve::core::hub::{Client as Watcher, ClientProtocol, Hub, count};
@@ -32,7 +32,11 @@ const MOST: usize = 200_000;
 const LOOK: Duration = Duration::from_millis(5);
 
 /// Publishes every attitude until the daemon ends.
-pub(in crate::serve) async fn send(address: NatsAddress, context: Context, tenancy: Arc<Tenancy>) {
+pub(in crate::serve) async fn send(
+    address: NatsAddress,
+    context: Context,
+    tenancy: Arc<LeaseWatch>,
+) {
     let Context {
         hub, mut running, ..
     } = context;
@@ -75,7 +79,7 @@ struct Publisher {
     client: Client,
     jetstream: Option<JetStream>,
     hub: Arc<Hub>,
-    tenancy: Arc<Tenancy>,
+    tenancy: Arc<LeaseWatch>,
     /// Number of the tenure to which `lasts` belongs.
     number: u64,
     /// The last message of each subject, as far as it is known.
@@ -153,7 +157,7 @@ impl Publisher {
         }
         while !batches.is_empty() {
             let tenure = self.tenancy.now();
-            if tenure.number() != number || matches!(tenure, Tenure::None { .. }) {
+            if tenure.number() != number || matches!(tenure, LeaseState::None { .. }) {
                 return;
             }
             let is_there = self.client.connection_state() == State::Connected;

@@ -6,7 +6,7 @@
 use super::address::{From, LeaseKey, NatsAddress};
 use super::connection::{in_words, keep_connecting};
 use super::lease::{Document, Lease, worker_name};
-use super::tenure::{Tenancy, Tenure};
+use super::tenure::{LeaseState, LeaseWatch};
 use crate::serve::brokers::{MAX_PAYLOAD, lost};
 use crate::serve::core::hub::{Complaint, Hub};
 use crate::serve::core::outgoing::Outgoing;
@@ -39,7 +39,7 @@ const BETWEEN_ERRORS: Duration = Duration::from_secs(1);
 const ERRORS: &str = ".err";
 
 /// Why reading has ended.
-enum Ended {
+enum EndOfReading {
     /// The daemon ends.
     Asked,
     /// Somebody else has the sensors.
@@ -53,7 +53,7 @@ struct Reader {
     address: NatsAddress,
     outgoing: Arc<Outgoing>,
     hub: Arc<Hub>,
-    tenancy: Arc<Tenancy>,
+    tenancy: Arc<LeaseWatch>,
     client: Client,
     /// Number of the last message of the stream that was taken.
     sequence: Option<u64>,
@@ -66,7 +66,7 @@ struct Reader {
 pub(in crate::serve) async fn keep(
     address: NatsAddress,
     outgoing: Arc<Outgoing>,
-    (hub, tenancy): (Arc<Hub>, Arc<Tenancy>),
+    (hub, tenancy): (Arc<Hub>, Arc<LeaseWatch>),
     mut running: Running,
 ) {
     let heard = {
@@ -121,7 +121,7 @@ impl Reader {
     async fn take_turns(&mut self, key: &LeaseKey, running: &mut Running) {
         let worker = worker_name(&self.hub.session());
         let mut redial = Redial::default();
-        self.tenancy.set(Tenure::None { number: 0 });
+        self.tenancy.set(LeaseState::None { number: 0 });
         self.outgoing.place(|place| place.is_held = Some(false));
         loop {
             let taken = tokio::select! {
@@ -206,9 +206,9 @@ impl Reader {
                 .read(&mut session, lease.as_ref(), &mut ids, running)
                 .await
             {
-                Ended::Asked => break true,
-                Ended::Lost => break false,
-                Ended::Failed(why) => {
+                EndOfReading::Asked => break true,
+                EndOfReading::Lost => break false,
+                EndOfReading::Failed(why) => {
                     if began.elapsed() > Duration::from_secs(5) {
                         redial = Redial::default();
                     }
@@ -237,14 +237,14 @@ impl Reader {
         lease: Option<&Arc<Lease>>,
         ids: &mut BTreeSet<String>,
         running: &mut Running,
-    ) -> Ended {
+    ) -> EndOfReading {
         let subscribed = tokio::select! {
             subscribed = self.subscribe() => subscribed,
-            () = running.asked() => return Ended::Asked,
+            () = running.asked() => return EndOfReading::Asked,
         };
         let mut messages = match subscribed {
             Ok(messages) => messages,
-            Err(why) => return Ended::Failed(why),
+            Err(why) => return EndOfReading::Failed(why),
         };
         self.outgoing.connected(&self.address.place.to_string());
         let mut tick = interval(EVERY);
@@ -254,14 +254,15 @@ impl Reader {
         loop {
             let is_crowded = self.waits() && tenancy.is_crowded();
             let is_lost = async {
-                let is_lost = |t: &Tenure| lease.is_some() && matches!(t, Tenure::None { .. });
+                let is_lost =
+                    |t: &LeaseState| lease.is_some() && matches!(t, LeaseState::None { .. });
                 // Whoever sets it lives as long as we do.
                 let _ = tenure.wait_for(is_lost).await.map(|_| ());
             };
             tokio::select! {
                 biased;
-                () = running.asked() => return Ended::Asked,
-                () = is_lost => return Ended::Lost,
+                () = running.asked() => return EndOfReading::Asked,
+                () = is_lost => return EndOfReading::Lost,
                 _ = tick.tick(), if lease.is_some() => {
                     if let Some(lease) = lease {
                         self.checkpoint(session, lease, ids).await;
@@ -278,8 +279,8 @@ impl Reader {
                             (place.sequence, place.lag) = (self.sequence, message.lag);
                         });
                     }
-                    Ok(None) => return Ended::Failed("the subscription has ended".to_owned()),
-                    Err(why) => return Ended::Failed(why),
+                    Ok(None) => return EndOfReading::Failed("the subscription has ended".to_owned()),
+                    Err(why) => return EndOfReading::Failed(why),
                 },
             }
         }

@@ -12,7 +12,7 @@ const CROWDED: usize = MAX_QUEUED / 2;
 
 /// State of the lease: which sensors are ours, and until when.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tenure {
+pub enum LeaseState {
     /// Free: a lease is not needed.
     #[default]
     Free,
@@ -30,13 +30,13 @@ pub enum Tenure {
     },
 }
 
-impl Tenure {
+impl LeaseState {
     /// Tells one tenure from the next.
     #[must_use]
     pub fn number(self) -> u64 {
         match self {
-            Tenure::Free => 0,
-            Tenure::None { number } | Tenure::Held { number, .. } => number,
+            LeaseState::Free => 0,
+            LeaseState::None { number } | LeaseState::Held { number, .. } => number,
         }
     }
 
@@ -44,35 +44,35 @@ impl Tenure {
     #[must_use]
     pub fn permits(self, now: Instant) -> bool {
         match self {
-            Tenure::Free => true,
-            Tenure::None { .. } => false,
-            Tenure::Held { until, .. } => now < until,
+            LeaseState::Free => true,
+            LeaseState::None { .. } => false,
+            LeaseState::Held { until, .. } => now < until,
         }
     }
 }
 
 /// Knowledge that the subscription and the outputs of one daemon share.
 #[derive(Debug, Default)]
-pub struct Tenancy {
-    tenure: watch::Sender<Tenure>,
+pub struct LeaseWatch {
+    tenure: watch::Sender<LeaseState>,
     outputs: Mutex<Vec<Arc<Client>>>,
 }
 
-impl Tenancy {
+impl LeaseWatch {
     /// State of the lease now.
     #[must_use]
-    pub fn now(&self) -> Tenure {
+    pub fn now(&self) -> LeaseState {
         *self.tenure.borrow()
     }
 
     /// Receiver of every change.
     #[must_use]
-    pub fn changes(&self) -> watch::Receiver<Tenure> {
+    pub fn changes(&self) -> watch::Receiver<LeaseState> {
         self.tenure.subscribe()
     }
 
     /// Changes the state.
-    pub fn set(&self, tenure: Tenure) {
+    pub fn set(&self, tenure: LeaseState) {
         self.tenure.send_replace(tenure);
     }
 
@@ -143,13 +143,13 @@ mod tests {
     fn attitudes_leave_while_the_lease_is_held_and_not_a_moment_longer() {
         let now = Instant::now();
         let until = now + Duration::from_secs(1);
-        assert!(Tenure::Free.permits(now));
-        assert!(!Tenure::None { number: 1 }.permits(now));
-        let held = Tenure::Held { number: 1, until };
+        assert!(LeaseState::Free.permits(now));
+        assert!(!LeaseState::None { number: 1 }.permits(now));
+        let held = LeaseState::Held { number: 1, until };
         assert!(held.permits(until - Duration::from_nanos(1)));
         assert!(!held.permits(until) && !held.permits(until + Duration::from_secs(9)));
-        let tenancy = Tenancy::default();
-        assert_eq!(tenancy.now(), Tenure::Free);
+        let tenancy = LeaseWatch::default();
+        assert_eq!(tenancy.now(), LeaseState::Free);
         tenancy.set(held);
         assert_eq!(tenancy.now().number(), 1);
     }

@@ -36,7 +36,7 @@ impl Message {
 
 /// Consecutive messages of one key.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Turn {
+pub struct KeyBatch {
     /// The key.
     pub key: Arc<str>,
     /// Number lost before them, since the last turn of this key; with those of keys there was no room for.
@@ -125,7 +125,7 @@ impl Rings {
 
     /// The next turn that is there, if one is.
     #[must_use]
-    pub fn now(&self) -> Option<Turn> {
+    pub fn now(&self) -> Option<KeyBatch> {
         let mut state = self.state();
         let State {
             rings,
@@ -153,7 +153,7 @@ impl Rings {
             }
             false => turns.push_back(key.clone()),
         }
-        Some(Turn {
+        Some(KeyBatch {
             key,
             lost,
             messages,
@@ -161,7 +161,7 @@ impl Rings {
     }
 
     /// The next turn. May be dropped and called again: nothing is lost.
-    pub async fn next(&self) -> Turn {
+    pub async fn next(&self) -> KeyBatch {
         loop {
             if let Some(turn) = self.now() {
                 return turn;
@@ -185,7 +185,7 @@ mod tests {
         }
     }
 
-    fn firsts(turn: &Turn) -> Vec<u8> {
+    fn firsts(turn: &KeyBatch) -> Vec<u8> {
         turn.messages.iter().map(|m| m.payload[0]).collect()
     }
 

@@ -5,7 +5,7 @@
 
 use super::address::ZenohAddress;
 use super::connection::{connect, end, lost};
-use super::rings::{Message, Rings, Turn};
+use super::rings::{KeyBatch, Message, Rings};
 use super::robot::{Read, Robots};
 use super::ros::{self, Key, Token};
 use crate::serve::brokers::{self, MAX_PAYLOAD};
@@ -147,7 +147,7 @@ impl Reader {
         Ok(())
     }
 
-    async fn take(&mut self, turn: Turn) {
+    async fn take(&mut self, turn: KeyBatch) {
         if turn.lost > 0 {
             let what = format!(
                 "{}: {} messages were lost, they came faster than they are taken",
@@ -178,7 +178,7 @@ impl Reader {
     }
 
     /// Lines or packed objects.
-    async fn take_own(&mut self, turn: &Turn) {
+    async fn take_own(&mut self, turn: &KeyBatch) {
         let part = turn.key.rsplit('/').next().unwrap_or_default();
         let name = match &self.address.id {
             Some(id) => Ok(id.clone()),
@@ -212,7 +212,7 @@ impl Reader {
     }
 
     /// Messages of one topic of ROS.
-    fn take_ros(&mut self, turn: &Turn) {
+    fn take_ros(&mut self, turn: &KeyBatch) {
         let Some(key) = Key::read(&turn.key) else {
             return self.session.unused("no key of ROS 2");
         };

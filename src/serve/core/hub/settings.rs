@@ -6,7 +6,7 @@ use crate::serve::guard::limits::Limits;
 use crate::serve::protocol::position::Timeline;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 
 /// Settings of a hub.
 #[derive(Debug, Default)]
@@ -14,9 +14,9 @@ pub struct Settings {
     /// Options by which lines are read, for every sensor: that is done before it is known whose they are.
     pub decode: strapd_recording::decode::Options,
     /// Settings by which samples are understood and integrated.
-    pub plan: Plan,
+    pub plan: EstimationSettings,
     /// Settings for sensors that are understood in another way, by `id`.
-    pub plans: BTreeMap<String, Plan>,
+    pub plans: BTreeMap<String, EstimationSettings>,
     /// The bounds.
     pub limits: Limits,
     /// Token that clients must show.

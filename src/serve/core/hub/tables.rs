@@ -3,7 +3,7 @@
 //! Apart from the hub because each has its own locks, and none of them names another.
 
 use super::places::Absent;
-use super::referring::Truth;
+use super::truth::Truth;
 use super::{Client, Sensor};
 use crate::serve::core::channel::Channel;
 use crate::serve::core::state;
@@ -12,15 +12,15 @@ use crate::sink::ChildFrames;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Arc, Mutex, RwLock};
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::EstimationSettings;
 use tokio::sync::Notify;
 
 /// Sensors, those that are there and those that were.
 #[derive(Debug)]
 pub(super) struct SensorTable {
-    plan: Plan,
+    plan: EstimationSettings,
     /// Plans of sensors that have their own.
-    plans: BTreeMap<String, Plan>,
+    plans: BTreeMap<String, EstimationSettings>,
     pub(super) by_id: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
     /// Attitudes of sensors that are not there.
     pub(super) absent: Mutex<Absent>,
@@ -36,8 +36,8 @@ pub(super) struct SensorTable {
 
 impl SensorTable {
     pub(super) fn new(
-        plan: Plan,
-        plans: BTreeMap<String, Plan>,
+        plan: EstimationSettings,
+        plans: BTreeMap<String, EstimationSettings>,
         saved: state::Sensors,
     ) -> SensorTable {
         SensorTable {
@@ -53,7 +53,7 @@ impl SensorTable {
     }
 
     /// Settings by which the samples of this sensor are understood.
-    pub(super) fn plan_of(&self, id: &str) -> &Plan {
+    pub(super) fn plan_of(&self, id: &str) -> &EstimationSettings {
         self.plans.get(id).unwrap_or(&self.plan)
     }
 }

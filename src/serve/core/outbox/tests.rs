@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::serve::core::channel::Channel;
-use crate::serve::core::last::Wanted;
+use crate::serve::core::last_attitude::Wanted;
 use crate::sink::Stream;
 use nalgebra::Vector3;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};

@@ -38,13 +38,13 @@ pub(super) struct Worker {
     synced: Instant,
     said: Option<(Instant, u64)>,
     /// Counts in the chunk being filled, and in the last one written.
-    pending: Taken,
-    last: Taken,
+    pending: RecordedCounts,
+    last: RecordedCounts,
 }
 
 /// Input samples and attitudes.
 #[derive(Clone, Copy, Debug, Default)]
-struct Taken {
+struct RecordedCounts {
     samples: u64,
     attitudes: u64,
 }
@@ -76,8 +76,8 @@ impl Worker {
             opened: Instant::now(),
             synced: Instant::now(),
             said: None,
-            pending: Taken::default(),
-            last: Taken::default(),
+            pending: RecordedCounts::default(),
+            last: RecordedCounts::default(),
         };
         worker.begin(worker.settings.force)?;
         Ok(worker)

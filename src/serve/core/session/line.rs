@@ -18,7 +18,7 @@ impl Session {
         let before = scratch.run.samples.len();
         let decoder = match &self.side {
             Side::Source(naming) => naming.decoder.as_ref(),
-            Side::Client { .. } | Side::Deaf { .. } => None,
+            Side::Client { .. } | Side::ListenOnly { .. } => None,
         };
         let decoder = decoder.unwrap_or(self.hub.decoder());
         let samples = &mut scratch.run.samples;
@@ -124,7 +124,7 @@ impl Session {
         // Of one that may not be mixed with another each sample is refused.
         let named = match &mut self.side {
             Side::Source(naming) => naming.name(&mut head, false),
-            Side::Client { .. } | Side::Deaf { .. } => Ok(()),
+            Side::Client { .. } | Side::ListenOnly { .. } => Ok(()),
         };
         let head = named.map(|()| head).map_err(Box::new);
         self.bind_or_say(stream, head, said, received, scratch);

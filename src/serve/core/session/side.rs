@@ -13,17 +13,17 @@ pub enum Side {
         trusted: bool,
     },
     /// Sender that is told nothing: what it asks for is passed over.
-    Deaf {
+    ListenOnly {
         /// Whether it is trusted.
         trusted: bool,
     },
     /// A source we connected to: nobody who asks anything of us.
-    Source(Box<Naming>),
+    Source(Box<SourceNames>),
 }
 
 /// Naming: how the lines of a source are read and its sensor is called.
 #[derive(Debug)]
-pub struct Naming {
+pub struct SourceNames {
     pub(super) id: Option<String>,
     /// Name of a sensor that does not state one: the subject of its message does.
     pub(super) subject: Option<String>,
@@ -41,7 +41,7 @@ impl Side {
     /// where that is not the one of everybody.
     #[must_use]
     pub fn source(id: Option<String>, decoder: Option<LineDecoder>) -> Side {
-        Side::Source(Box::new(Naming {
+        Side::Source(Box::new(SourceNames {
             id,
             subject: None,
             decoder,
@@ -57,7 +57,7 @@ impl Side {
 
     /// Whether it is told nothing.
     pub(super) fn is_deaf(&self) -> bool {
-        matches!(self, Side::Deaf { .. })
+        matches!(self, Side::ListenOnly { .. })
     }
 
     /// Whether it speaks for many sensors.
@@ -77,7 +77,7 @@ impl Side {
     }
 }
 
-impl Naming {
+impl SourceNames {
     /// Gives a line's sensor its name here. What comes beside the gyro belongs to it (`is_beside`).
     pub(super) fn name(&mut self, head: &mut Line, is_beside: bool) -> Result<(), Fault> {
         if self.id.is_none() && head.id.is_some() {

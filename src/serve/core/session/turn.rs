@@ -20,7 +20,7 @@ const LONGEST_RUN: usize = 64;
 
 /// Bytes that wait for the next step.
 #[derive(Debug)]
-pub(super) struct Held {
+pub(super) struct PendingBytes {
     bytes: Bytes,
     received: Nanos,
     /// Whether their end ends the last line.
@@ -29,7 +29,7 @@ pub(super) struct Held {
 
 /// Progress of a step.
 #[derive(Debug, Default)]
-pub(super) struct Step {
+pub(super) struct WorkSlice {
     /// Something was asked for in it.
     pub(super) asked: bool,
     /// Something was answered.
@@ -102,7 +102,7 @@ impl Session {
             let before = self.held.take();
             let (waiting, ended) = before.map_or((Bytes::new(), false), |h| (h.bytes, h.whole));
             let between: &[u8] = if ended { b"\n" } else { b"" };
-            self.held = Some(Held {
+            self.held = Some(PendingBytes {
                 bytes: [&waiting, between, bytes].concat().into(),
                 received,
                 whole,
@@ -112,7 +112,7 @@ impl Session {
         let rest = self.step(bytes, whole, received, scratch);
         if rest > 0 {
             let rest = bytes.get(bytes.len() - rest..).unwrap_or_default();
-            self.held = Some(Held {
+            self.held = Some(PendingBytes {
                 bytes: Bytes::copy_from_slice(rest),
                 received,
                 whole,
@@ -122,7 +122,7 @@ impl Session {
 
     /// Works on bytes for no longer than a step. Says how many of them are left.
     fn step(&mut self, bytes: &[u8], whole: bool, received: Nanos, scratch: &mut Scratch) -> usize {
-        self.step = Step::default();
+        self.step = WorkSlice::default();
         if !self.begins(bytes) {
             return 0;
         }

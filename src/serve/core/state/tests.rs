@@ -6,7 +6,7 @@ use crate::serve::core::session::{Scratch, Session};
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::sync::Arc;
-use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 
 fn sample() -> AttitudeSample {
     AttitudeSample {
@@ -26,9 +26,9 @@ fn sample() -> AttitudeSample {
 fn gone_on(saved: Sensors, samples: impl Iterator<Item = u64>) -> (Sensors, Value) {
     let settings = Settings {
         saved,
-        plan: Plan {
+        plan: EstimationSettings {
             aid: Aid::Gravity,
-            ..Plan::default()
+            ..EstimationSettings::default()
         },
         ..Settings::default()
     };

@@ -45,7 +45,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use nalgebra::Vector3;
-    use strapd_attitude::aid::{self, Aided, Start};
+    use strapd_attitude::aid::{self, AidedPropagator, Start};
     use strapd_attitude::frames::In;
     use strapd_attitude::propagate;
     use strapd_attitude::quaternion::{BodyRate, Quaternion, RotationVector};
@@ -56,7 +56,7 @@ mod tests {
         let filter = {
             let (propagation, settings) =
                 (propagate::Settings::default(), aid::Settings::default());
-            let mut aided = Aided::new(propagation, settings, Start::Level).unwrap();
+            let mut aided = AidedPropagator::new(propagation, settings, Start::Level).unwrap();
             let first = RateSample {
                 stamp: Nanos(0),
                 start: Nanos(0),

@@ -1,7 +1,7 @@
 //! `RESET` of one sensor: remembered until its next sample is there to begin with. Pure.
 
 use super::SensorStream;
-use strapd_attitude::estimate::{Anew, Initial, Plan};
+use strapd_attitude::estimate::{EstimationSettings, Initial, RestartRequest};
 use strapd_attitude::record::RawSample;
 
 /// Reset that was asked of a sensor, and how often.
@@ -19,7 +19,11 @@ impl SensorStream {
     ///
     /// # Errors
     /// In words: it cannot begin so.
-    pub fn reset(&mut self, plan: &Plan, initial: Option<Initial>) -> Result<&'static str, String> {
+    pub fn reset(
+        &mut self,
+        plan: &EstimationSettings,
+        initial: Option<Initial>,
+    ) -> Result<&'static str, String> {
         let asked = initial.unwrap_or(plan.initial);
         let is_aided = self.estimator.filter().is_some();
         let from = match asked {
@@ -37,11 +41,11 @@ impl SensorStream {
     }
 
     /// Resets, if asked, before the sample `next` is integrated.
-    pub(super) fn reset_if_asked(&mut self, plan: &Plan, next: &RawSample) {
+    pub(super) fn reset_if_asked(&mut self, plan: &EstimationSettings, next: &RawSample) {
         let Some(asked) = self.resetting.pending.take() else {
             return;
         };
-        let at = |initial| Anew::at(plan, initial, &self.resolved, &self.prepared, next);
+        let at = |initial| RestartRequest::at(plan, initial, &self.resolved, &self.prepared, next);
         // Who was promised an orientation and sends none begins as without.
         let Ok(anew) = at(asked).or_else(|_| at(Initial::Identity)) else {
             return;

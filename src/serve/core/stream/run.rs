@@ -11,7 +11,7 @@ use strapd_recording::decode::{Bare, Line};
 
 /// Whether a sender's samples have a place of their own beside their stamps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Placed {
+pub enum OrderedBy {
     /// Place by stamp: the first stamp of a connection tells where it goes on.
     #[default]
     ByStamp,
@@ -30,7 +30,7 @@ pub struct SampleRun<'a> {
     /// Time at which they were received.
     pub received: Nanos,
     /// Place in their stream.
-    pub placed: Placed,
+    pub placed: OrderedBy,
     /// The sender's number of each line, and where its samples end.
     pub lines: &'a [(Option<u64>, usize)],
     /// The samples.
@@ -52,7 +52,7 @@ impl<'a> SampleRun<'a> {
 
 /// Place of a connection's first sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Standing {
+pub(super) enum RunPlacement {
     /// Continuation behind everything that was taken.
     GoesOn,
     /// Repetition among what was taken.
@@ -73,17 +73,22 @@ pub(in crate::serve) struct Span {
 impl Span {
     /// Place of a connection whose first stamp is this. Further back than `window` nobody sends
     /// again.
-    pub(super) fn standing(self, stamp: Nanos, window: Duration, placed: Placed) -> Standing {
+    pub(super) fn standing(
+        self,
+        stamp: Nanos,
+        window: Duration,
+        placed: OrderedBy,
+    ) -> RunPlacement {
         let window = i64::try_from(window.as_nanos()).unwrap_or(i64::MAX);
         if stamp > self.last {
-            Standing::GoesOn
-        } else if placed == Placed::ByPosition {
-            Standing::Again
+            RunPlacement::GoesOn
+        } else if placed == OrderedBy::ByPosition {
+            RunPlacement::Again
         } else if self.first.is_some_and(|first| stamp <= first) || self.last.since(stamp) > window
         {
-            Standing::Anew
+            RunPlacement::Anew
         } else {
-            Standing::Again
+            RunPlacement::Again
         }
     }
 }
@@ -100,22 +105,22 @@ mod tests {
         };
         let window = Duration::from_nanos(50);
         for (stamp, by_stamps, by_position) in [
-            (201, Standing::GoesOn, Standing::GoesOn),
-            (200, Standing::Again, Standing::Again),
-            (150, Standing::Again, Standing::Again),
-            (149, Standing::Anew, Standing::Again),
-            (100, Standing::Anew, Standing::Again),
-            (i64::MIN, Standing::Anew, Standing::Again),
+            (201, RunPlacement::GoesOn, RunPlacement::GoesOn),
+            (200, RunPlacement::Again, RunPlacement::Again),
+            (150, RunPlacement::Again, RunPlacement::Again),
+            (149, RunPlacement::Anew, RunPlacement::Again),
+            (100, RunPlacement::Anew, RunPlacement::Again),
+            (i64::MIN, RunPlacement::Anew, RunPlacement::Again),
         ] {
             let of = |placed| span.standing(Nanos(stamp), window, placed);
-            assert_eq!(of(Placed::ByStamp), by_stamps, "{stamp}");
-            assert_eq!(of(Placed::ByPosition), by_position, "{stamp}");
+            assert_eq!(of(OrderedBy::ByStamp), by_stamps, "{stamp}");
+            assert_eq!(of(OrderedBy::ByPosition), by_position, "{stamp}");
         }
         // A short run: its first sample again, although within the window.
         let all = Duration::from_secs(60);
         assert_eq!(
-            span.standing(Nanos(100), all, Placed::ByStamp),
-            Standing::Anew
+            span.standing(Nanos(100), all, OrderedBy::ByStamp),
+            RunPlacement::Anew
         );
         // Of a file of an older release the first stamp is not known.
         let old = Span {
@@ -123,8 +128,8 @@ mod tests {
             ..span
         };
         assert_eq!(
-            old.standing(Nanos(100), all, Placed::ByStamp),
-            Standing::Again
+            old.standing(Nanos(100), all, OrderedBy::ByStamp),
+            RunPlacement::Again
         );
     }
 }

@@ -31,7 +31,7 @@ pub(super) struct Stamps {
 
 /// Samples that came together: as they came, or others in their place.
 #[derive(Debug, Default)]
-pub struct Taken {
+pub struct TimedSamples {
     /// The sender's number of each line, and where its samples end.
     pub lines: Vec<(Option<u64>, usize)>,
     /// The samples.
@@ -79,7 +79,7 @@ impl Stamps {
         samples: &[RawSample],
         bare: &[Option<Bare>],
         received: Nanos,
-    ) -> (Option<Taken>, Option<Ambiguous>) {
+    ) -> (Option<TimedSamples>, Option<Ambiguous>) {
         if bare.is_empty() && self.waiting.is_empty() {
             return (None, None);
         }
@@ -98,7 +98,7 @@ impl Stamps {
     }
 
     /// Releases those whose stamps are known by now; all of them when nobody is to wait any longer.
-    pub(super) fn release(&mut self, at_last: bool) -> (Taken, Option<Ambiguous>) {
+    pub(super) fn release(&mut self, at_last: bool) -> (TimedSamples, Option<Ambiguous>) {
         let mut why = None;
         if self.unit == Unit::Open {
             let numbers = || self.waiting.iter().filter_map(|(_, _, bare)| *bare);
@@ -121,11 +121,11 @@ impl Stamps {
             Unit::Ambiguous => None,
             // None of those that wait would be bare but the last few.
             Unit::Open if !at_last && self.waiting.iter().any(|w| w.2.is_some()) => {
-                return (Taken::default(), None);
+                return (TimedSamples::default(), None);
             }
             Unit::Open => None,
         };
-        let mut taken = Taken::default();
+        let mut taken = TimedSamples::default();
         for (seq, sample, bare) in self.waiting.drain(..) {
             let stamp = bare.zip(unit).map(|(bare, unit)| bare.in_unit(unit));
             taken.samples.push(RawSample {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Reads lines to the end of `input` on this thread; whoever started the daemon is trusted, and
 /// what is wrong with the lines is said in the log.
 pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
-    let side = Side::Deaf { trusted: true };
+    let side = Side::ListenOnly { trusted: true };
     let mut session = Session::with(hub, "standard input".to_owned(), side);
     let mut flood = Flood::default();
     loop {

@@ -1,7 +1,7 @@
 //! TCP -> sessions. I/O.
 
 use super::duplex::{self, Duplex};
-use super::{accept, prepare, unheard};
+use super::{accept, initial_kind, prepare};
 use crate::serve::core::context::Context;
 use crate::serve::guard::peer::Peer;
 use std::future::Future;
@@ -45,7 +45,7 @@ pub(super) fn expect_notice(stream: &TcpStream, within: Duration) {
 }
 
 pub(super) async fn serve(listener: TcpListener, context: Context) {
-    let kind = unheard(&context.hub);
+    let kind = initial_kind(&context.hub);
     accept(
         context,
         kind,

@@ -50,7 +50,7 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                     session: Session::with(
                         &hub,
                         Peer::at("udp", peer),
-                        Side::Deaf { trusted: false },
+                        Side::ListenOnly { trusted: false },
                     ),
                     heard: Instant::now(),
                 });

@@ -1,7 +1,7 @@
 //! Unix socket -> sessions. I/O.
 
 use super::duplex::{self, Duplex};
-use super::{accept, unheard};
+use super::{accept, initial_kind};
 use crate::serve::core::context::Context;
 use crate::serve::guard::peer::Peer;
 use std::future::Future;
@@ -89,7 +89,7 @@ impl Duplex for UnixStream {
 
 pub(super) async fn serve(bound: Bound, context: Context) {
     let name = format!("unix://{}", bound.path.display());
-    let kind = unheard(&context.hub);
+    let kind = initial_kind(&context.hub);
     accept(
         context,
         kind,

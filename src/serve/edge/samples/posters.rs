@@ -29,11 +29,11 @@ pub(super) const MAX_POSTERS: usize = 256;
 /// requests are no connections, and two gyros in one attitude are no attitude.
 #[derive(Debug, Default)]
 pub(crate) struct Posters {
-    known: Mutex<HashMap<IpAddr, Known>>,
+    known: Mutex<HashMap<IpAddr, KnownAddress>>,
 }
 
 #[derive(Debug)]
-struct Known {
+struct KnownAddress {
     heard: Instant,
     poster: Arc<tokio::sync::Mutex<Poster>>,
 }
@@ -48,7 +48,7 @@ pub(super) struct Poster {
 
 /// Outcome of a body.
 #[derive(Debug, Default)]
-pub(super) struct Taken {
+pub(super) struct PostOutcome {
     objects: u64,
     samples: u64,
     resets: u64,
@@ -65,7 +65,7 @@ enum Posted {
 }
 
 impl Posters {
-    fn known(&self) -> MutexGuard<'_, HashMap<IpAddr, Known>> {
+    fn known(&self) -> MutexGuard<'_, HashMap<IpAddr, KnownAddress>> {
         // Every change is whole before anything could panic.
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -82,7 +82,7 @@ impl Posters {
         }
         let entry = known.entry(from).or_insert_with(|| {
             tokio::spawn(self.clone().forget_when_silent(from, hub.clone()));
-            Known {
+            KnownAddress {
                 heard: Instant::now(),
                 poster: Arc::new(tokio::sync::Mutex::new(Poster::new(hub, from))),
             }
@@ -126,8 +126,8 @@ impl Poster {
         objects: Objects<'_>,
         name: Option<&str>,
         received: Nanos,
-    ) -> Taken {
-        let mut taken = Taken::default();
+    ) -> PostOutcome {
+        let mut taken = PostOutcome::default();
         let mut run = RunBuilder::default();
         let mut in_a_row = 0;
         for object in objects {
@@ -218,7 +218,7 @@ impl Poster {
         gathered: &mut RunBuilder,
         until: usize,
         received: Nanos,
-        taken: &mut Taken,
+        taken: &mut PostOutcome,
     ) {
         let Some(run) = gathered.run(self.client.number, received, until) else {
             return;
@@ -283,7 +283,7 @@ fn within(lines: &[(Option<u64>, usize)], from: usize, to: usize) -> Vec<(Option
     part
 }
 
-impl Taken {
+impl PostOutcome {
     /// Counts a part of a run that was used, and what is said of it.
     fn part(&mut self, hub: &Hub, part: &SampleRun<'_>, Feedback { note, faults, lost }: Feedback) {
         self.samples += rates_in(part.samples) as u64;

@@ -1,7 +1,7 @@
 //! Bodies whose vertical axis hardly leans, rests that are none, and rests that are short.
 
 use crate::aid::covariance::{BIAS, Correction, Covariance, HEADING, TILT, Transition, WIDTH};
-use crate::aid::{Aided, Settings, Start};
+use crate::aid::{AidedPropagator, Settings, Start};
 use crate::frames::In;
 use crate::propagate;
 use crate::quaternion::BodyRate;
@@ -37,12 +37,12 @@ type Pose<'a> = &'a dyn Fn(f64) -> (Vector3<f64>, Vector3<f64>);
 
 /// A filter that has had the mean rates and the forces of a motion, a gyro with a bias and white noise of `noise`
 /// rad/s/sqrt(Hz).
-fn fed(secs: f64, bias: Vector3<f64>, noise: f64, seed: u64, pose: Pose<'_>) -> Aided {
+fn fed(secs: f64, bias: Vector3<f64>, noise: f64, seed: u64, pose: Pose<'_>) -> AidedPropagator {
     let propagation = propagate::Settings {
         kind: SampleKind::Average,
         ..propagate::Settings::default()
     };
-    let mut aided = Aided::new(propagation, Settings::default(), Start::Level).unwrap();
+    let mut aided = AidedPropagator::new(propagation, Settings::default(), Start::Level).unwrap();
     let mut random = Noise(seed);
     let at = |t: f64| {
         let (angles, acceleration) = pose(t);
@@ -99,7 +99,7 @@ fn wheels(degrees: f64, seed: u64) -> impl Fn(f64) -> (Vector3<f64>, Vector3<f64
 }
 
 /// Error of the bias about the body's z, and its sigma, deg/s.
-fn about_z(aided: &Aided, bias: Vector3<f64>) -> (f64, f64) {
+fn about_z(aided: &AidedPropagator, bias: Vector3<f64>) -> (f64, f64) {
     let error = aided.filter().calibration().bias.z - bias.z;
     let sigma = aided.filter().calibration_sigma().bias.z;
     (error.to_degrees(), sigma.to_degrees())

@@ -1,7 +1,7 @@
 //! Tests of the filter with a body at rest, with bad values, with other axes, through our own propagator.
 
 use super::golden::{Run, angle_at_end, plain, run, sample};
-use crate::aid::{Aided, Settings, Start};
+use crate::aid::{AidedPropagator, Settings, Start};
 use crate::frames::In;
 use crate::propagate;
 use crate::quaternion::BodyRate;
@@ -164,13 +164,13 @@ fn stream() -> Vec<RateSample> {
         .collect()
 }
 
-fn aided(method: propagate::Method) -> Aided {
+fn aided(method: propagate::Method) -> AidedPropagator {
     let propagation = propagate::Settings {
         method,
         kind: SampleKind::Average,
         ..propagate::Settings::default()
     };
-    Aided::new(propagation, plain(), Start::Level).unwrap()
+    AidedPropagator::new(propagation, plain(), Start::Level).unwrap()
 }
 
 #[test]
@@ -259,7 +259,7 @@ fn a_rotated_world_does_not_become_bias() {
         world_rate: In::assume(rate),
         ..propagate::Settings::default()
     };
-    let mut aided = Aided::new(propagation, Settings::default(), Start::Level).unwrap();
+    let mut aided = AidedPropagator::new(propagation, Settings::default(), Start::Level).unwrap();
     let samples: Vec<RateSample> = stream()
         .iter()
         .map(|s| RateSample {
@@ -303,8 +303,9 @@ fn fed(
     settings: Settings,
     secs: i64,
     measured: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>),
-) -> Aided {
-    let mut aided = Aided::new(propagate::Settings::default(), settings, Start::Level).unwrap();
+) -> AidedPropagator {
+    let mut aided =
+        AidedPropagator::new(propagate::Settings::default(), settings, Start::Level).unwrap();
     let mut out = Vec::new();
     for i in 0..100 * secs {
         let (rate, force) = measured(i as f64 * 0.01);

@@ -27,7 +27,7 @@ fn recorded() -> Vec<RawSample> {
     (0..800).map(sample).collect()
 }
 
-fn plan(given: &[(&str, &str)]) -> Plan {
+fn plan(given: &[(&str, &str)]) -> EstimationSettings {
     let mut plan = defaults();
     for (name, text) in given {
         row(name)
@@ -39,7 +39,7 @@ fn plan(given: &[(&str, &str)]) -> Plan {
     plan
 }
 
-fn attitudes(plan: &Plan, samples: &[RawSample]) -> Vec<AttitudeSample> {
+fn attitudes(plan: &EstimationSettings, samples: &[RawSample]) -> Vec<AttitudeSample> {
     let meaning = Meaning::new(plan, &Declared::default());
     let mut preparation = Preparation::new(plan, &meaning, Patience::WholeLog);
     for sample in samples {

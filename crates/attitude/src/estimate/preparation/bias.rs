@@ -7,14 +7,18 @@ use super::{Patience, is_live};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::diagnostic::Diagnostic;
 use crate::estimate::meaning::Meaning;
-use crate::estimate::plan::{Aid, Bias, Plan};
+use crate::estimate::plan::{Aid, Bias, EstimationSettings};
 use crate::quaternion::BodyRate;
 use crate::setting::{BIAS, EARTH_RATE, START};
 use nalgebra::Vector3;
 
 /// Whether nobody has said the bias of a file that is aided, and a rest would tell it better than its class. With the
 /// Earth's rotation taken out it is the rest at the start alone that could, and on the way the filter learns as much.
-pub(super) fn looks_for_bias(plan: &Plan, resolved: &Meaning, patience: Patience) -> bool {
+pub(super) fn looks_for_bias(
+    plan: &EstimationSettings,
+    resolved: &Meaning,
+    patience: Patience,
+) -> bool {
     plan.bias == Bias::Unsaid
         && plan.aid != Aid::None
         && patience == Patience::WholeLog
@@ -25,20 +29,23 @@ pub(super) fn looks_for_bias(plan: &Plan, resolved: &Meaning, patience: Patience
 }
 
 /// The plan with the bias of a file's rests, if they tell it, those that do, and what to say of the others.
-pub(super) fn with_bias_of_rest(plan: Plan, rests: &Rests) -> (Plan, Rests, Option<Diagnostic>) {
+pub(super) fn with_bias_of_rest(
+    plan: EstimationSettings,
+    rests: &Rests,
+) -> (EstimationSettings, Rests, Option<Diagnostic>) {
     let (rests, turn) = rests.less_turns(plan.noise.bias_of_class());
     let bias = match stillness::estimate_bias(&rests, &Limits::default()) {
         Ok(_) => Bias::Auto,
         Err(_) => Bias::None,
     };
-    (Plan { bias, ..plan }, rests, turn)
+    (EstimationSettings { bias, ..plan }, rests, turn)
 }
 
 /// Returns the bias that is removed, rad/s, its sigma and its origin in words. `earth` is what the gyro feels of the Earth's rotation at the initial attitude, rad/s, where that is
 /// taken out: then it is no bias, and only a rest at the start, where the attitude is known, can tell
 /// the two apart.
 pub(super) fn decide_bias(
-    (plan, resolved): (&Plan, &Meaning),
+    (plan, resolved): (&EstimationSettings, &Meaning),
     rests: &Rests,
     earth: Option<Vector3<f64>>,
 ) -> Result<(BodyRate, Vector3<f64>, String), Diagnostic> {

@@ -6,7 +6,8 @@ use crate::condition::{
 };
 use crate::diagnostic::Diagnostic;
 use crate::estimate::plan::{
-    Aid, Bias, CLASS_BY_DATA, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise, Plan, Truncation,
+    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise,
+    Truncation,
 };
 use crate::frames::BodyAxes;
 use crate::propagate::{Method, Order};
@@ -15,12 +16,17 @@ use crate::record::SampleKind;
 use crate::setting::*;
 use crate::worlds::World;
 
-const fn word(name: &'static str, meaning: &'static str, set: fn(&mut Plan)) -> Word {
+const fn word(name: &'static str, meaning: &'static str, set: fn(&mut EstimationSettings)) -> Word {
     Word { name, meaning, set }
 }
 
 /// A number without words before it.
-const fn number(unit: &'static str, least: f64, most: f64, set: fn(&mut Plan, f64)) -> Takes {
+const fn number(
+    unit: &'static str,
+    least: f64,
+    most: f64,
+    set: fn(&mut EstimationSettings, f64),
+) -> Takes {
     Takes::Number {
         before: "",
         unit,
@@ -57,7 +63,7 @@ pub static ROWS: [Row; 36] = [
             word(Clock::Header.name(), "The stamp inside the message", |p| p.clock = Clock::Header),
             word(Clock::Log.name(), "Time at which it was recorded", |p| p.clock = Clock::Log),
             word(Clock::Publish.name(), "Time at which it was sent", |p| p.clock = Clock::Publish),
-            // Without a rate, which the next row sets and `Plan::check` asks for.
+            // Without a rate, which the next row sets and `EstimationSettings::check` asks for.
             word(Clock::Index { rate_hz: 0.0 }.name(), "Number of the sample divided by {rate_hz}", |p| p.clock = Clock::Index { rate_hz: f64::NAN }),
         ],
         ..ROW
@@ -488,7 +494,7 @@ pub static ROWS: [Row; 36] = [
     },
 ];
 
-fn has_window(plan: &Plan) -> Result<(), Diagnostic> {
+fn has_window(plan: &EstimationSettings) -> Result<(), Diagnostic> {
     match plan.method {
         Method::Magnus { .. } | Method::CommitProvisional { .. } | Method::Live { .. } => Ok(()),
         other => Err(format!(
@@ -499,7 +505,7 @@ fn has_window(plan: &Plan) -> Result<(), Diagnostic> {
     }
 }
 
-fn set_window(plan: &mut Plan, samples: usize) {
+fn set_window(plan: &mut EstimationSettings, samples: usize) {
     match &mut plan.method {
         Method::Magnus { window, .. } | Method::CommitProvisional { window, .. } => {
             *window = samples;
@@ -515,7 +521,7 @@ fn set_window(plan: &mut Plan, samples: usize) {
     }
 }
 
-fn set_order(plan: &mut Plan, given: Order) {
+fn set_order(plan: &mut EstimationSettings, given: Order) {
     if let Method::Magnus { order, .. }
     | Method::CommitProvisional { order, .. }
     | Method::Live { order, .. } = &mut plan.method

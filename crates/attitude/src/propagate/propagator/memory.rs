@@ -4,7 +4,7 @@
 //! unseen. Of the samples only those are kept that a window may still hold.
 
 use super::state::State;
-use super::{Engine, FASTEST, LARGEST, LOOKED_BACK, Propagator, Waiting};
+use super::{Engine, FASTEST, LARGEST, LOOKED_BACK, PendingSample, Propagator};
 use crate::frames::In;
 use crate::plausible::{are_numbers, is_unit};
 use crate::propagate::accumulate::Accumulator;
@@ -81,7 +81,7 @@ impl Propagator {
             return None;
         }
         let last = self.output.state.last;
-        let row = |waiting: &Waiting| {
+        let row = |waiting: &PendingSample| {
             let sample = &waiting.sample;
             let accel = sample.accel.map(|force| (*force.as_vector()).into());
             let age = last.saturating_sub(sample.stamp.0);
@@ -135,7 +135,7 @@ impl Propagator {
         self.output.state = memory.state;
         self.output.attitude = memory.attitude;
         self.output.covariance = covariance;
-        let rows = |rows: &[Row]| -> VecDeque<Waiting> {
+        let rows = |rows: &[Row]| -> VecDeque<PendingSample> {
             rows.iter()
                 .map(|row| waiting(memory.state.last, row))
                 .collect()
@@ -178,9 +178,9 @@ impl Propagator {
     }
 }
 
-fn waiting(last: i64, &(age, accel, status, log, turns): &Row) -> Waiting {
+fn waiting(last: i64, &(age, accel, status, log, turns): &Row) -> PendingSample {
     let stamp = Nanos(last.saturating_sub(age));
-    Waiting {
+    PendingSample {
         // Its value is in the track.
         sample: RateSample {
             stamp,

@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 
 /// A sample taken in and not yet output.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Waiting {
+pub(super) struct PendingSample {
     pub(super) sample: RateSample,
     /// Whether it advances in time and so ends an interval.
     pub(super) turns: bool,
@@ -199,12 +199,12 @@ impl Output {
     #[inline(always)]
     pub(super) fn emit(
         &mut self,
-        queue: &mut VecDeque<Waiting>,
+        queue: &mut VecDeque<PendingSample>,
         track: &Track,
         k: usize,
         out: &mut Vec<AttitudeSample>,
     ) {
-        if let Some(Waiting { sample, .. }) = queue.pop_front() {
+        if let Some(PendingSample { sample, .. }) = queue.pop_front() {
             self.output_at(&sample, Some(track.rate(k)), out);
         }
         self.flush_stalled(queue, out);
@@ -214,10 +214,10 @@ impl Output {
     #[inline(always)]
     pub(super) fn flush_stalled(
         &mut self,
-        queue: &mut VecDeque<Waiting>,
+        queue: &mut VecDeque<PendingSample>,
         out: &mut Vec<AttitudeSample>,
     ) {
-        while let Some(&Waiting {
+        while let Some(&PendingSample {
             sample,
             turns: false,
         }) = queue.front()

@@ -1,7 +1,7 @@
 //! Intervals a fixed window would serve badly: at the ends of a run, beside and across gaps, among irregular
 //! stamps. As many samples as the data support. Pure.
 
-use super::{Note, Plan, Step};
+use super::{Note, Step, WindowKernel};
 use crate::propagate::bridge::{self, NEIGHBOURS, Observation};
 use crate::propagate::collocation;
 use crate::propagate::columns::{Track, secs};
@@ -17,7 +17,7 @@ struct Settled {
     used: usize,
 }
 
-impl Plan {
+impl WindowKernel {
     /// One interval, with the window chosen by the data.
     pub(super) fn careful(&self, track: &Track, k: usize) -> Step {
         let hole = self.increments && track.has_hole(k);

@@ -4,7 +4,7 @@ use super::logs::{Motion, errors, log, smoothed};
 use crate::frames::{Body, In};
 use crate::quaternion::BodyRate;
 use crate::record::Nanos;
-use crate::smooth::{FieldUnit, Looseness, Outcome, Sample, Settings, SmoothError, smooth};
+use crate::smooth::{FieldUnit, Outcome, PriorScale, Sample, Settings, SmoothError, smooth};
 use nalgebra::Vector3;
 
 fn sample(i: i64) -> Sample {
@@ -251,9 +251,9 @@ fn settings_that_can_not_be_are_refused() {
             ..Settings::default()
         },
         Settings {
-            looseness: Looseness {
+            looseness: PriorScale {
                 axes: 0.0,
-                ..Looseness::default()
+                ..PriorScale::default()
             },
             ..Settings::default()
         },

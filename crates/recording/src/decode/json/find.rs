@@ -3,8 +3,8 @@
 //! Long because it is one machine: a key decides how its value is read, and every kind of value comes back to the keys
 //! inside it.
 
-use super::Plan;
-use super::found::{Found, Written};
+use super::Program;
+use super::found::{ObjectFields, Written};
 use super::scan::{MAX_DEPTH, Scanner};
 use super::trie::Target;
 use crate::decode::fields::FieldRole;
@@ -24,7 +24,7 @@ type Scan<T> = Result<T, Undecodable>;
 #[derive(Debug)]
 pub(crate) struct Seeker<'a, 'p> {
     scanner: Scanner<'a>,
-    plan: &'p Plan,
+    plan: &'p Program,
     auto_gyro: bool,
     auto_accel: bool,
     auto_mag: bool,
@@ -43,7 +43,7 @@ pub(crate) struct Seeker<'a, 'p> {
 }
 
 impl<'a, 'p> Seeker<'a, 'p> {
-    pub(crate) fn new(plan: &'p Plan, scanner: Scanner<'a>) -> Self {
+    pub(crate) fn new(plan: &'p Program, scanner: Scanner<'a>) -> Self {
         let auto = |role| !plan.trie.gives(role);
         Seeker {
             scanner,
@@ -64,10 +64,10 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// The whole payload: an object, or an array of them.
-    pub(crate) fn message(&mut self) -> Scan<Found<'a>> {
+    pub(crate) fn message(&mut self) -> Scan<ObjectFields<'a>> {
         let found = match self.scanner.peek() {
             Some(b'[') => {
-                let mut found = Found::default();
+                let mut found = ObjectFields::default();
                 self.array(Some(0), 0, &mut found)?;
                 found.settle(self.plan.stamp_rule());
                 found
@@ -84,10 +84,10 @@ impl<'a, 'p> Seeker<'a, 'p> {
         Ok(found)
     }
 
-    fn object(&mut self, at: Option<usize>, depth: u32, twist: bool) -> Scan<Found<'a>> {
-        let mut found = Found {
+    fn object(&mut self, at: Option<usize>, depth: u32, twist: bool) -> Scan<ObjectFields<'a>> {
+        let mut found = ObjectFields {
             px4: self.plan.px4.is_some(),
-            ..Found::default()
+            ..ObjectFields::default()
         };
         self.scanner.enter();
         let mut first = true;
@@ -108,7 +108,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// A value on a path of `--field`.
-    fn given(&mut self, node: usize, depth: u32, found: &mut Found<'a>) -> Scan<()> {
+    fn given(&mut self, node: usize, depth: u32, found: &mut ObjectFields<'a>) -> Scan<()> {
         match self.plan.trie.target(node) {
             None => self.inside(Some(node), depth, false, found),
             Some(Target::Stamp(unit)) => {
@@ -141,7 +141,13 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// A value whose key may say what it is.
-    fn named(&mut self, key: &str, depth: u32, twist: bool, found: &mut Found<'a>) -> Scan<()> {
+    fn named(
+        &mut self,
+        key: &str,
+        depth: u32,
+        twist: bool,
+        found: &mut ObjectFields<'a>,
+    ) -> Scan<()> {
         match self.meaning(key, twist) {
             Some(Meaning::Gyro { rank, unit }) if self.auto_gyro => {
                 found.names_gyro = true;
@@ -164,7 +170,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             }
             Some(accel @ (Meaning::Accel { .. } | Meaning::DeltaVelocity)) if self.auto_accel => {
                 found.delta_velocity |= accel == Meaning::DeltaVelocity;
-                if let Some(v) = self.vector(1, &mut Found::default())? {
+                if let Some(v) = self.vector(1, &mut ObjectFields::default())? {
                     found.vector(Slot::ACCEL, v);
                 }
             }
@@ -174,7 +180,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 }
             }
             Some(Meaning::Mag) if self.auto_mag => {
-                if let Some(v) = self.vector(1, &mut Found::default())? {
+                if let Some(v) = self.vector(1, &mut ObjectFields::default())? {
                     found.vector(Slot::MAG, v);
                 }
             }
@@ -238,7 +244,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// A key that means no quantity: a mark, a name, or something to look into.
-    fn other(&mut self, key: &str, depth: u32, found: &mut Found<'a>) -> Scan<()> {
+    fn other(&mut self, key: &str, depth: u32, found: &mut ObjectFields<'a>) -> Scan<()> {
         let first = self.scanner.peek();
         match (key, first) {
             ("angular_velocity_covariance", Some(b'[')) => self.mark(Slot::GYRO_MARK, found),
@@ -282,7 +288,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
         at: Option<usize>,
         depth: u32,
         twist: bool,
-        found: &mut Found<'a>,
+        found: &mut ObjectFields<'a>,
     ) -> Scan<()> {
         let limit = if at.is_some() { MAX_DEPTH } else { MAX_SEARCH };
         match self.scanner.peek() {
@@ -296,7 +302,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
         }
     }
 
-    fn array(&mut self, at: Option<usize>, depth: u32, found: &mut Found<'a>) -> Scan<()> {
+    fn array(&mut self, at: Option<usize>, depth: u32, found: &mut ObjectFields<'a>) -> Scan<()> {
         self.scanner.enter();
         let mut first = true;
         let mut index = 0_u32;
@@ -320,7 +326,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// One object of an array: a sample of a batch, or one transform among others.
-    fn element(&mut self, element: Found<'a>, found: &mut Found<'a>) -> Scan<()> {
+    fn element(&mut self, element: ObjectFields<'a>, found: &mut ObjectFields<'a>) -> Scan<()> {
         if element.has_gyro() || (self.plan.takes_besides && element.is_beside()) {
             if self.batched >= MAX_BATCH {
                 return Err(Undecodable::TooMany {
@@ -342,7 +348,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
         Ok(())
     }
 
-    fn number(&mut self, slot: Slot, found: &mut Found<'a>) -> Scan<()> {
+    fn number(&mut self, slot: Slot, found: &mut ObjectFields<'a>) -> Scan<()> {
         if let Some(value) = self.scanner.float()? {
             found.registers.float(slot, value);
         }
@@ -350,7 +356,12 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// An interval under a name of PX4's, and its unit: JSON has no types, and none is shorter than a microsecond.
-    fn interval(&mut self, named: TimeUnit, slot: Slot, found: &mut Found<'a>) -> Scan<TimeUnit> {
+    fn interval(
+        &mut self,
+        named: TimeUnit,
+        slot: Slot,
+        found: &mut ObjectFields<'a>,
+    ) -> Scan<TimeUnit> {
         let Some(value) = self.scanner.float()? else {
             return Ok(named);
         };
@@ -359,7 +370,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     /// The first number of an array.
-    fn mark(&mut self, slot: Slot, found: &mut Found<'a>) -> Scan<()> {
+    fn mark(&mut self, slot: Slot, found: &mut ObjectFields<'a>) -> Scan<()> {
         self.scanner.enter();
         let mut first = true;
         let mut index = 0;
@@ -376,7 +387,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
 
     /// Three numbers: an array of three, or an object with x, y, z, or one that wraps either; `null`
     /// in any place is none. A stamp inside the wrapper is the sample's own.
-    fn vector(&mut self, wraps: u32, found: &mut Found<'a>) -> Scan<Option<[f64; 3]>> {
+    fn vector(&mut self, wraps: u32, found: &mut ObjectFields<'a>) -> Scan<Option<[f64; 3]>> {
         match self.scanner.peek() {
             Some(b'[') => self.triple(),
             Some(b'{') => {
@@ -451,7 +462,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
 
     /// An object with w, x, y, z. An array of four has no order of its own and is taken only from
     /// the one message that defines it (PX4: w first).
-    fn quaternion(&mut self, w_first: bool, found: &mut Found<'a>) -> Scan<()> {
+    fn quaternion(&mut self, w_first: bool, found: &mut ObjectFields<'a>) -> Scan<()> {
         let mut values = [None; 4];
         match self.scanner.peek() {
             Some(b'{') => {

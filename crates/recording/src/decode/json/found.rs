@@ -56,7 +56,7 @@ fn measured_by(sensor: &str) -> Option<Slot> {
 
 /// Contents of one object.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Found<'a> {
+pub(crate) struct ObjectFields<'a> {
     pub(crate) registers: Registers,
     /// Weakness of the gyro's name; a lower one displaces it.
     pub(crate) gyro_rank: Option<u8>,
@@ -79,12 +79,12 @@ pub(crate) struct Found<'a> {
     /// An object and one inside it both have a stamp.
     pub(crate) has_rival_stamps: bool,
     /// Contents of objects inside this one; joined last, so that the order of keys does not matter.
-    pub(crate) nested: Option<Box<Found<'a>>>,
+    pub(crate) nested: Option<Box<ObjectFields<'a>>>,
     /// Samples of an array inside.
-    pub(crate) batch: Vec<Found<'a>>,
+    pub(crate) batch: Vec<ObjectFields<'a>>,
 }
 
-impl<'a> Found<'a> {
+impl<'a> ObjectFields<'a> {
     /// Puts a body rate unless one of a better name is there.
     pub(crate) fn gyro(
         &mut self,
@@ -156,7 +156,7 @@ impl<'a> Found<'a> {
     }
 
     /// Keeps what an object inside this one held, until all keys have been seen.
-    pub(crate) fn nest(&mut self, inner: Found<'a>, rule: StampRule) {
+    pub(crate) fn nest(&mut self, inner: ObjectFields<'a>, rule: StampRule) {
         self.names_gyro |= inner.names_gyro;
         if inner.registers.seen == 0 && inner.batch.is_empty() && inner.stamp.is_none() {
             return;
@@ -165,7 +165,7 @@ impl<'a> Found<'a> {
             Some(nested) => nested.join(inner, rule),
             // An empty one joins first, as any other: a stamp alone must not come in by itself.
             None => {
-                let mut nested = Found::default();
+                let mut nested = ObjectFields::default();
                 nested.join(inner, rule);
                 self.nested = Some(Box::new(nested));
             }
@@ -200,7 +200,7 @@ impl<'a> Found<'a> {
     }
 
     /// Takes in what an object inside this one held.
-    fn join(&mut self, mut inner: Found<'a>, rule: StampRule) {
+    fn join(&mut self, mut inner: ObjectFields<'a>, rule: StampRule) {
         let nearer = inner.has_gyro() || (inner.has_orientation() && !self.has_gyro());
         let wanted = (inner.has_gyro() && !self.has_gyro())
             || (inner.has_orientation() && !self.has_orientation());

@@ -37,11 +37,11 @@ pub(crate) fn keys(payload: &[u8]) -> Vec<String> {
 }
 
 /// Why a list of keys ends.
-struct Ended;
+struct EndOfKeys;
 
-impl From<Undecodable> for Ended {
-    fn from(_: Undecodable) -> Ended {
-        Ended
+impl From<Undecodable> for EndOfKeys {
+    fn from(_: Undecodable) -> EndOfKeys {
+        EndOfKeys
     }
 }
 
@@ -50,9 +50,9 @@ fn collect_keys(
     path: &mut String,
     depth: u32,
     list: &mut Vec<String>,
-) -> Result<(), Ended> {
+) -> Result<(), EndOfKeys> {
     if list.len() >= MAX_KEYS {
-        return Err(Ended);
+        return Err(EndOfKeys);
     }
     let first = &mut true;
     let length = path.len();

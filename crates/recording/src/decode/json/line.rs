@@ -4,7 +4,7 @@
 //! in it. Takes our own `RATE` and `ATT`, gpsd's `IMU` and `ATT`, SensorServer, Sensor Logger, and any
 //! object with a body rate.
 
-use super::Plan;
+use super::Program;
 use super::find::Seeker;
 use super::scan::Scanner;
 use crate::decode::refusal::exact_name;
@@ -66,7 +66,7 @@ impl Line {
 /// Reads lines; holds the paths of `--field`.
 #[derive(Debug, Clone, Default)]
 pub struct LineDecoder {
-    plan: Plan,
+    plan: Program,
 }
 
 impl LineDecoder {
@@ -74,7 +74,7 @@ impl LineDecoder {
     #[must_use]
     pub fn new(options: &Options) -> Self {
         LineDecoder {
-            plan: Plan::compile("", options),
+            plan: Program::compile("", options),
         }
     }
 
@@ -133,7 +133,7 @@ impl LineDecoder {
             Some("IMU") => Class::Imu,
             Some(other) => Class::Other(printable(other)),
         };
-        let of_rates = |find: &super::Found<'_>| (find.kind, find.unit);
+        let of_rates = |find: &super::ObjectFields<'_>| (find.kind, find.unit);
         let (kind, unit) = match found.batch.first() {
             Some(first) if !found.has_gyro() => of_rates(first),
             _ => of_rates(&found),

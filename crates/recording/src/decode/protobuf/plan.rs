@@ -1,9 +1,9 @@
-//! [`Schema`] and [`Selection`] -> [`Plan`]. Pure.
+//! [`Schema`] and [`Selection`] -> [`Program`]. Pure.
 
-use super::{Action, Emit, MAX_COUNTERS, Node, Plan};
+use super::{Action, Emit, MAX_COUNTERS, Node, Program};
 use crate::decode::registers::Slot;
 use crate::decode::schema::{Kind, Many, Number, Schema};
-use crate::decode::select::{Batch, Selection, Step, path_text};
+use crate::decode::select::{Batch, PathStep, Selection, path_text};
 use std::collections::BTreeMap;
 
 /// Compiles the plan that reads `selection`, and of the batch only the element of this child frame.
@@ -14,7 +14,7 @@ pub(crate) fn samples(
     schema: &Schema,
     selection: &Selection,
     child: Option<&str>,
-) -> Result<Plan, String> {
+) -> Result<Program, String> {
     let child = child.filter(|_| selection.child.is_some());
     let mut builder = Builder::new(schema, selection.batch.as_ref(), child.is_some());
     for pick in &selection.picks {
@@ -33,7 +33,7 @@ pub(crate) fn samples(
 ///
 /// # Errors
 /// As [`samples`].
-pub(crate) fn text(schema: &Schema, path: &[Step]) -> Result<Plan, String> {
+pub(crate) fn text(schema: &Schema, path: &[PathStep]) -> Result<Program, String> {
     let mut builder = Builder::new(schema, None, false);
     builder.text(path, Action::Capture)?;
     builder.plan.batched = true;
@@ -44,17 +44,17 @@ struct Builder<'a> {
     schema: &'a Schema,
     batch: Option<&'a Batch>,
     by_child: bool,
-    plan: Plan,
+    plan: Program,
     /// Node of each path that has one.
-    nodes: BTreeMap<Vec<Step>, usize>,
+    nodes: BTreeMap<Vec<PathStep>, usize>,
     counters: usize,
 }
 
 impl<'a> Builder<'a> {
     fn new(schema: &'a Schema, batch: Option<&'a Batch>, by_child: bool) -> Self {
-        let plan = Plan {
+        let plan = Program {
             nodes: vec![Node::default()],
-            ..Plan::default()
+            ..Program::default()
         };
         Builder {
             schema,
@@ -67,13 +67,13 @@ impl<'a> Builder<'a> {
     }
 
     /// Goes to the struct that holds the last field of `path`: its node and that field.
-    fn descend(&mut self, path: &[Step]) -> Result<(usize, Leaf), String> {
+    fn descend(&mut self, path: &[PathStep]) -> Result<(usize, Leaf), String> {
         let unreadable = || format!("`{}` cannot be read", path_text(self.schema, path));
         let (mut structure, mut node) = (self.schema.root, 0);
         let mut walked = Vec::new();
         let mut steps = path.iter().peekable();
         while let Some(step) = steps.next() {
-            let Step::Field(index) = step else {
+            let PathStep::Field(index) = step else {
                 return Err(unreadable());
             };
             let field = self
@@ -83,7 +83,7 @@ impl<'a> Builder<'a> {
                 .ok_or_else(unreadable)?;
             walked.push(*step);
             let array = walked.clone();
-            let element = steps.next_if(|s| !matches!(s, Step::Field(_))).copied();
+            let element = steps.next_if(|s| !matches!(s, PathStep::Field(_))).copied();
             walked.extend(element);
             match field.kind {
                 Kind::Struct(inner) => {
@@ -99,7 +99,7 @@ impl<'a> Builder<'a> {
                 Kind::Number(number) if steps.peek().is_none() => {
                     let element = match (element, field.many) {
                         (None, Many::One) => None,
-                        (Some(Step::At(n)), Many::Sequence) => Some(n),
+                        (Some(PathStep::At(n)), Many::Sequence) => Some(n),
                         _ => return Err(unreadable()),
                     };
                     let leaf = Leaf {
@@ -123,19 +123,19 @@ impl<'a> Builder<'a> {
         Err(unreadable())
     }
 
-    fn emit(&self, array: &[Step]) -> Emit {
+    fn emit(&self, array: &[PathStep]) -> Emit {
         match self.batch.filter(|batch| batch.path == array) {
             None => Emit::No,
             Some(_) if self.by_child => Emit::FirstMatch,
             Some(Batch {
-                element: Step::At(n),
+                element: PathStep::At(n),
                 ..
             }) => Emit::At(*n),
             Some(_) => Emit::Each,
         }
     }
 
-    fn child_node(&mut self, parent: usize, number: u32, path: &[Step], emit: Emit) -> usize {
+    fn child_node(&mut self, parent: usize, number: u32, path: &[PathStep], emit: Emit) -> usize {
         if let Some(&node) = self.nodes.get(path) {
             return node;
         }
@@ -152,7 +152,7 @@ impl<'a> Builder<'a> {
         node
     }
 
-    fn number(&mut self, path: &[Step], slot: Slot) -> Result<(), String> {
+    fn number(&mut self, path: &[PathStep], slot: Slot) -> Result<(), String> {
         let (node, leaf) = self.descend(path)?;
         let number = leaf
             .number
@@ -180,7 +180,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn text(&mut self, path: &[Step], action: Action) -> Result<(), String> {
+    fn text(&mut self, path: &[PathStep], action: Action) -> Result<(), String> {
         let (node, leaf) = self.descend(path)?;
         if leaf.number.is_some() {
             return Err(format!("`{}` is no text", path_text(self.schema, path)));

@@ -1,14 +1,14 @@
-//! [`Schema`] and [`Selection`] -> [`Plan`]. Pure.
+//! [`Schema`] and [`Selection`] -> [`Program`]. Pure.
 //!
 //! Fields of fixed size run together into blocks, so that an Imu is three steps: stamp, frame,
 //! 37 doubles. The compiler knows the position modulo 8 as far as the layout fixes it, and leaves
 //! to the walk only the alignments it cannot know, those behind a string or a sequence.
 
 use super::read::Read;
-use super::{Emit, Keep, Mark, Op, Plan};
+use super::{Emit, Keep, Mark, Op, Program};
 use crate::decode::registers::Slot;
 use crate::decode::schema::{Field, Kind, Many, Number, Schema};
-use crate::decode::select::{Batch, Selection, Step, path_text};
+use crate::decode::select::{Batch, PathStep, Selection, path_text};
 
 /// Deepest nesting, and most fields a message may have once its nested types are written out.
 const MAX_DEPTH: usize = 32;
@@ -32,7 +32,7 @@ pub(crate) fn samples(
     selection: &Selection,
     child: Option<&str>,
     layout: Layout,
-) -> Result<Plan, String> {
+) -> Result<Program, String> {
     let mut wants: Vec<Want<'_>> = selection
         .picks
         .iter()
@@ -59,7 +59,7 @@ pub(crate) fn samples(
 }
 
 /// Compiles the plan that finds one string.
-pub(crate) fn text(schema: &Schema, path: &[Step], layout: Layout) -> Result<Plan, String> {
+pub(crate) fn text(schema: &Schema, path: &[PathStep], layout: Layout) -> Result<Program, String> {
     let want = Want {
         path,
         what: What::Text(Keep::Capture),
@@ -70,7 +70,7 @@ pub(crate) fn text(schema: &Schema, path: &[Step], layout: Layout) -> Result<Pla
 /// Something to take, and the rest of the way to it.
 #[derive(Clone, Copy)]
 struct Want<'a> {
-    path: &'a [Step],
+    path: &'a [PathStep],
     what: What,
 }
 
@@ -92,13 +92,13 @@ struct Compiler<'a> {
     schema: &'a Schema,
     batch: Option<&'a Batch>,
     layout: Layout,
-    plan: Plan,
+    plan: Program,
     /// Position modulo `modulus`, as far as it is known.
     residue: usize,
     modulus: usize,
     /// The block being filled: its length, where its reads and marks begin.
     block: Option<(usize, usize, usize)>,
-    path: Vec<Step>,
+    path: Vec<PathStep>,
     left: usize,
     fields: usize,
 }
@@ -109,10 +109,10 @@ impl<'a> Compiler<'a> {
             schema,
             batch,
             layout,
-            plan: Plan {
+            plan: Program {
                 cdr: layout == Layout::Cdr,
                 batched: batch.is_some(),
-                ..Plan::default()
+                ..Program::default()
             },
             residue: 0,
             modulus: 8,
@@ -123,7 +123,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn message(mut self, wants: &[Want<'_>]) -> Result<Plan, String> {
+    fn message(mut self, wants: &[Want<'_>]) -> Result<Program, String> {
         self.left = wants.len();
         match self.structure(self.schema.root, wants) {
             Ok(()) => {}
@@ -155,11 +155,11 @@ impl<'a> Compiler<'a> {
             let inner: Vec<Want<'_>> = wants
                 .iter()
                 .filter_map(|want| match want.path.split_first() {
-                    Some((Step::Field(i), path)) if *i == n => Some(Want { path, ..*want }),
+                    Some((PathStep::Field(i), path)) if *i == n => Some(Want { path, ..*want }),
                     _ => None,
                 })
                 .collect();
-            self.path.push(Step::Field(n));
+            self.path.push(PathStep::Field(n));
             self.field(field, &inner)?;
             self.path.pop();
         }
@@ -207,7 +207,7 @@ impl<'a> Compiler<'a> {
         for want in wants {
             let element = match want.path {
                 [] if n == 1 => 0,
-                [Step::At(k)] if *k < n => *k as usize,
+                [PathStep::At(k)] if *k < n => *k as usize,
                 _ => continue,
             };
             self.read(reads, start + element * size, number, want);
@@ -249,7 +249,7 @@ impl<'a> Compiler<'a> {
         let from = self.plan.reads.len();
         let mut need = 0;
         for want in wants {
-            if let [Step::At(k)] = want.path {
+            if let [PathStep::At(k)] = want.path {
                 need = need.max(*k as usize + 1);
                 self.read(from, *k as usize * size, number, want);
             }
@@ -321,7 +321,7 @@ impl<'a> Compiler<'a> {
             name,
         });
         self.forget();
-        self.path.push(element.unwrap_or(Step::Each));
+        self.path.push(element.unwrap_or(PathStep::Each));
         let compiled = match kind {
             Kind::Struct(index) => self.structure(index, &inner),
             _ => {
@@ -350,7 +350,7 @@ impl<'a> Compiler<'a> {
             None => Emit::No,
             Some(_) if self.plan.child.is_some() => Emit::FirstMatch,
             Some(Batch {
-                element: Step::At(n),
+                element: PathStep::At(n),
                 ..
             }) => Emit::At(*n),
             Some(_) => Emit::Each,

@@ -3,7 +3,7 @@
 //! Chosen by the layout, not by the type's name: a plan that equals the plan of the built-in
 //! definition. Whatever is irregular about a payload gives `None`, and the plan explains it.
 
-use super::Plan;
+use super::Program;
 use super::compile::{Layout, samples};
 use crate::decode::Decoded;
 use crate::decode::registers::{Form, is_mark};
@@ -16,7 +16,7 @@ use strapd_attitude::record::{Nanos, RawSample};
 const BODY: usize = imu::NUMBERS * 8;
 
 /// Whether `plan` reads an Imu, everything of it, and nothing else.
-pub(crate) fn is_imu(plan: &Plan) -> bool {
+pub(crate) fn is_imu(plan: &Program) -> bool {
     let (layout, dialect) = if plan.cdr {
         (Layout::Cdr, Dialect::Ros2)
     } else {
@@ -168,7 +168,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// The plan of the built-in Imu, with and without the short way.
-    fn plans(layout: Layout, dialect: Dialect, ignore: bool) -> [Plan; 2] {
+    fn plans(layout: Layout, dialect: Dialect, ignore: bool) -> [Program; 2] {
         let schema = builtin::schema("sensor_msgs/Imu", dialect).unwrap();
         let options = Options {
             ignore_covariance_flag: ignore,

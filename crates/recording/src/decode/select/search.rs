@@ -7,7 +7,9 @@
 
 use super::names::{self, Meaning, Px4};
 use super::shapes::{end_of, quaternion, stamp_at, stamp_in, structs_on, text_near, vector, with};
-use super::{End, Found, Pick, Selection, StampFields, Step, batch_of, path_text, px4_stamp};
+use super::{
+    End, MatchQuality, PathStep, Pick, Selection, StampFields, batch_of, path_text, px4_stamp,
+};
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Number, Schema, Struct, last_name};
@@ -25,7 +27,7 @@ const MAX_FIELDS: usize = 50_000;
 /// A struct, and the way to it.
 #[derive(Clone)]
 struct Site {
-    path: Vec<Step>,
+    path: Vec<PathStep>,
     structure: usize,
     each: bool,
     depth: usize,
@@ -41,7 +43,7 @@ pub(super) fn complete(
     let by_child = options.child_frame.is_some();
     let sites = sites(schema);
     let px4 = names::px4(type_name);
-    let given = selection.found == Found::Given;
+    let given = selection.found == MatchQuality::Given;
     let around = if given {
         selection.picks.first().map(|p| p.path.clone())
     } else if options.wanted == Wanted::Rates {
@@ -69,7 +71,7 @@ pub(super) fn complete(
         .find_map(|path| text_near(schema, path, "frame_id"));
     if by_child && let Some(batch) = &selection.batch {
         let mut element = batch.path.clone();
-        element.push(Step::Each);
+        element.push(PathStep::Each);
         selection.child = text_near(schema, &element, "child_frame_id");
     }
 }
@@ -77,7 +79,7 @@ pub(super) fn complete(
 /// Selects the stamp, of all on the way to the vector the `nth`.
 fn find_stamp(
     schema: &Schema,
-    chain: &[Vec<Step>],
+    chain: &[Vec<PathStep>],
     nth: usize,
     is_px4: bool,
     selection: &mut Selection,
@@ -175,9 +177,9 @@ fn sites(schema: &Schema) -> Vec<Site> {
                 continue;
             }
             let mut path = site.path.clone();
-            path.push(Step::Field(index));
+            path.push(PathStep::Field(index));
             if each {
-                path.push(Step::Each);
+                path.push(PathStep::Each);
             }
             queue.push_back(Site {
                 path,
@@ -198,23 +200,23 @@ fn sites(schema: &Schema) -> Vec<Site> {
 
 /// A body rate that was found.
 struct Candidate {
-    key: (Found, bool, usize, u8),
-    paths: Vec<Vec<Step>>,
-    whole: Vec<Step>,
+    key: (MatchQuality, bool, usize, u8),
+    paths: Vec<Vec<PathStep>>,
+    whole: Vec<PathStep>,
     holder: String,
     unit: Option<GyroUnit>,
     delta: bool,
 }
 
 /// One axis that has a field of its own: rank, path, unit.
-type Axis = (u8, Vec<Step>, Option<GyroUnit>);
+type Axis = (u8, Vec<PathStep>, Option<GyroUnit>);
 
 fn find_gyro(
     schema: &Schema,
     sites: &[Site],
     px4: Option<Px4>,
     selection: &mut Selection,
-) -> Option<Vec<Step>> {
+) -> Option<Vec<PathStep>> {
     let mut best: Option<Candidate> = None;
     for site in sites {
         let structure = schema.get(site.structure)?;
@@ -251,17 +253,23 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
     let mut list = Vec::new();
     let mut axes: [Option<Axis>; 3] = [None, None, None];
     for (index, field) in structure.fields.iter().enumerate() {
-        let path = with(&site.path, Step::Field(index));
+        let path = with(&site.path, PathStep::Field(index));
         let vector = |depth| vector(schema, &path, End::from(field), depth);
         match names::meaning(&field.name) {
             Some(Meaning::Gyro { rank, unit }) => list.extend(
-                vector(2).map(|v| candidate(Found::Named, rank, v, path.clone(), unit, false)),
+                vector(2)
+                    .map(|v| candidate(MatchQuality::Named, rank, v, path.clone(), unit, false)),
             ),
-            Some(Meaning::DeltaAngle) => {
-                list.extend(vector(2).map(|v| {
-                    candidate(Found::Named, 1, v, path.clone(), Some(GyroUnit::Rad), true)
-                }))
-            }
+            Some(Meaning::DeltaAngle) => list.extend(vector(2).map(|v| {
+                candidate(
+                    MatchQuality::Named,
+                    1,
+                    v,
+                    path.clone(),
+                    Some(GyroUnit::Rad),
+                    true,
+                )
+            })),
             Some(Meaning::GyroAxis { axis, rank, unit }) => {
                 let better = |old: &Option<Axis>| old.as_ref().is_none_or(|o| rank < o.0);
                 if let Some(slot) = axes.get_mut(usize::from(axis))
@@ -273,9 +281,9 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
             }
             _ => {
                 let found = match (field.name.as_str(), own_name, px4) {
-                    ("xyz", _, Some(Px4::VehicleAngularVelocity)) => Found::Named,
-                    ("angular", "Twist", _) => Found::Twist,
-                    ("vector", "Vector3Stamped", _) => Found::Vector,
+                    ("xyz", _, Some(Px4::VehicleAngularVelocity)) => MatchQuality::Named,
+                    ("angular", "Twist", _) => MatchQuality::Twist,
+                    ("vector", "Vector3Stamped", _) => MatchQuality::Vector,
                     _ => continue,
                 };
                 list.extend(vector(0).map(|v| candidate(found, 0, v, path.clone(), None, false)));
@@ -288,12 +296,12 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
             many: Many::One,
         };
         let own = vector(schema, &site.path, end, 0);
-        list.extend(own.map(|v| candidate(Found::Named, 0, v, Vec::new(), None, false)));
+        list.extend(own.map(|v| candidate(MatchQuality::Named, 0, v, Vec::new(), None, false)));
     }
     if let [Some((rank, x, unit)), Some((_, y, _)), Some((_, z, _))] = axes {
         let whole = x.clone();
         list.push(candidate(
-            Found::Named,
+            MatchQuality::Named,
             rank,
             vec![x, y, z],
             whole,
@@ -306,9 +314,9 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
 
 /// Struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`, the outermost in which the rest of the path is
 /// still a vector.
-fn holder_of(schema: &Schema, gyro: &[Step]) -> Option<Vec<Step>> {
-    let named_in = |path: &Vec<Step>| {
-        let Some(Step::Field(next)) = gyro.get(path.len()) else {
+fn holder_of(schema: &Schema, gyro: &[PathStep]) -> Option<Vec<PathStep>> {
+    let named_in = |path: &Vec<PathStep>| {
+        let Some(PathStep::Field(next)) = gyro.get(path.len()) else {
             return false;
         };
         let structure = end_of(schema, path).and_then(|e| e.structure(schema));
@@ -317,15 +325,20 @@ fn holder_of(schema: &Schema, gyro: &[Step]) -> Option<Vec<Step>> {
         };
         let own_axis =
             gyro.len() == path.len() + 1 && !matches!(field.name.as_str(), "x" | "y" | "z");
-        let is_vector =
-            vector(schema, &with(path, Step::Field(*next)), End::from(field), 2).is_some();
+        let is_vector = vector(
+            schema,
+            &with(path, PathStep::Field(*next)),
+            End::from(field),
+            2,
+        )
+        .is_some();
         own_axis || is_vector
     };
     structs_on(schema, gyro).into_iter().rfind(named_in)
 }
 
 /// Selects what stands in the same struct as the body rate.
-fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Selection) {
+fn beside_gyro(schema: &Schema, gyro: &[PathStep], given: bool, selection: &mut Selection) {
     let Some(site) = holder_of(schema, gyro) else {
         return;
     };
@@ -333,11 +346,11 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
         return;
     };
     let named = gyro.get(site.len()).copied();
-    let mut accel_axes: [Option<Vec<Step>>; 3] = [None, None, None];
-    let mut mag_axes: [Option<Vec<Step>>; 3] = [None, None, None];
+    let mut accel_axes: [Option<Vec<PathStep>>; 3] = [None, None, None];
+    let mut mag_axes: [Option<Vec<PathStep>>; 3] = [None, None, None];
     let mut velocity = None;
     for (index, field) in structure.fields.iter().enumerate() {
-        let step = Step::Field(index);
+        let step = PathStep::Field(index);
         let path = with(&site, step);
         let number = End::from(field).number().is_some();
         if Some(step) == named {
@@ -411,7 +424,7 @@ fn find_alone(
     px4: Option<Px4>,
     wanted: Wanted,
     selection: &mut Selection,
-) -> Option<Vec<Step>> {
+) -> Option<Vec<PathStep>> {
     let (role, slot) = wanted.vector();
     let mark = match wanted {
         Wanted::Forces => Slot::ACCEL_MARK,
@@ -423,11 +436,11 @@ fn find_alone(
     );
     for site in sites {
         let structure = schema.get(site.structure)?;
-        let mut axes: [Option<Vec<Step>>; 3] = [None, None, None];
+        let mut axes: [Option<Vec<PathStep>>; 3] = [None, None, None];
         let mut found = None;
         let is_vector = last_name(&structure.name) == "Vector3Stamped";
         for (index, field) in structure.fields.iter().enumerate() {
-            let path = with(&site.path, Step::Field(index));
+            let path = with(&site.path, PathStep::Field(index));
             let axis = match (names::meaning(&field.name), wanted) {
                 (Some(Meaning::Accel { .. }), Wanted::Forces)
                 | (Some(Meaning::Mag), Wanted::Fields) => {
@@ -463,7 +476,7 @@ fn find_alone(
         let Some((paths, whole, marked)) = found else {
             continue;
         };
-        selection.found = Found::Named;
+        selection.found = MatchQuality::Named;
         selection.holder = structure.name.clone();
         selection.batch = paths.first().and_then(|path| batch_of(schema, path));
         selection.describe(role, schema, &whole);
@@ -484,8 +497,8 @@ fn is_float(field: &Field) -> bool {
 /// A delta velocity is a specific force only with its interval.
 fn take_delta_velocity(
     structure: &Struct,
-    site: &[Step],
-    velocity: Option<Vec<Vec<Step>>>,
+    site: &[PathStep],
+    velocity: Option<Vec<Vec<PathStep>>>,
     selection: &mut Selection,
 ) {
     let interval = structure
@@ -495,7 +508,7 @@ fn take_delta_velocity(
         .find_map(|(index, field)| match names::meaning(&field.name) {
             Some(Meaning::AccelInterval(unit)) => {
                 let unit = names::interval_unit(unit, is_float(field));
-                Some((with(site, Step::Field(index)), unit))
+                Some((with(site, PathStep::Field(index)), unit))
             }
             _ => None,
         });
@@ -512,7 +525,7 @@ fn take_delta_velocity(
 fn take_mark(
     structure: &Struct,
     field: &Field,
-    site: &[Step],
+    site: &[PathStep],
     slot: Slot,
     selection: &mut Selection,
 ) {
@@ -524,7 +537,7 @@ fn take_mark(
         .get(index)
         .is_some_and(|f| matches!((f.kind, f.many), (Kind::Number(_), Many::Array(1..))));
     if is_array {
-        let path = with(&with(site, Step::Field(index)), Step::At(0));
+        let path = with(&with(site, PathStep::Field(index)), PathStep::At(0));
         selection.take(vec![path], slot);
     }
 }
@@ -536,7 +549,7 @@ fn find_orientation(
     by_child: bool,
     selection: &mut Selection,
 ) {
-    let alone = selection.found == Found::Nothing;
+    let alone = selection.found == MatchQuality::Nothing;
     for site in sites {
         // Beside samples of a message's own, an array of orientations belongs to something else.
         if site.each && !alone {
@@ -552,17 +565,17 @@ fn find_orientation(
             ) {
                 continue;
             }
-            let mut path = with(&site.path, Step::Field(index));
+            let mut path = with(&site.path, PathStep::Field(index));
             let paths = if px4 == Some(Px4::VehicleAttitude) && field.many == Many::Array(4) {
-                Some((0..4).map(|n| with(&path, Step::At(n))).collect())
+                Some((0..4).map(|n| with(&path, PathStep::At(n))).collect())
             } else {
                 quaternion(schema, &path, End::from(field))
             };
             let Some(mut paths) = paths else { continue };
             if site.each && !by_child {
                 let steps = paths.iter_mut().flatten().chain(&mut path);
-                for step in steps.filter(|s| **s == Step::Each) {
-                    *step = Step::At(0);
+                for step in steps.filter(|s| **s == PathStep::Each) {
+                    *step = PathStep::At(0);
                 }
             }
             if alone {
@@ -583,7 +596,7 @@ fn find_orientation(
             };
             let counter = structure.fields.iter().position(is_counter);
             if let Some(index) = counter.filter(|_| !site.each) {
-                selection.take(vec![with(&site.path, Step::Field(index))], Slot::RESETS);
+                selection.take(vec![with(&site.path, PathStep::Field(index))], Slot::RESETS);
             }
             return;
         }
@@ -605,7 +618,7 @@ pub(super) fn available(schema: &Schema, role: FieldRole) -> Vec<String> {
             continue;
         };
         for (index, field) in structure.fields.iter().enumerate() {
-            let path = with(&site.path, Step::Field(index));
+            let path = with(&site.path, PathStep::Field(index));
             let end = End::from(field);
             let fits = match role {
                 FieldRole::Gyro | FieldRole::Accel | FieldRole::Mag => {

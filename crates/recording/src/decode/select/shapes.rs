@@ -3,7 +3,7 @@
 //! Apart from the search, which asks by name where to look; here only shapes count.
 
 use super::names::{self, Meaning, is_nanos, is_seconds};
-use super::{End, StampFields, Step};
+use super::{End, PathStep, StampFields};
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Schema, Struct};
 use strapd_attitude::record::TimeUnit;
@@ -12,13 +12,13 @@ use strapd_attitude::record::TimeUnit;
 /// or a struct that wraps one of these in a field called `vec`, `value` or the like.
 pub(super) fn vector(
     schema: &Schema,
-    path: &[Step],
+    path: &[PathStep],
     end: End,
     depth: u8,
-) -> Option<Vec<Vec<Step>>> {
+) -> Option<Vec<Vec<PathStep>>> {
     match (end.kind, end.many) {
         (Kind::Number(_), Many::Array(3) | Many::Sequence) => {
-            Some((0..3).map(|n| with(path, Step::At(n))).collect())
+            Some((0..3).map(|n| with(path, PathStep::At(n))).collect())
         }
         (Kind::Struct(index), Many::One) => {
             let structure = schema.get(index)?;
@@ -35,7 +35,7 @@ pub(super) fn vector(
             let field = structure.fields.get(inner)?;
             vector(
                 schema,
-                &with(path, Step::Field(inner)),
+                &with(path, PathStep::Field(inner)),
                 End::from(field),
                 depth - 1,
             )
@@ -46,17 +46,21 @@ pub(super) fn vector(
 
 /// Paths to w, x, y, z of a struct that has them. An array of four says nothing about its order and
 /// is never taken for one.
-pub(super) fn quaternion(schema: &Schema, path: &[Step], end: End) -> Option<Vec<Vec<Step>>> {
+pub(super) fn quaternion(
+    schema: &Schema,
+    path: &[PathStep],
+    end: End,
+) -> Option<Vec<Vec<PathStep>>> {
     numbers(end.structure(schema)?, path, &["w", "x", "y", "z"])
 }
 
-fn numbers(structure: &Struct, path: &[Step], names: &[&str]) -> Option<Vec<Vec<Step>>> {
+fn numbers(structure: &Struct, path: &[PathStep], names: &[&str]) -> Option<Vec<Vec<PathStep>>> {
     names
         .iter()
         .map(|name| {
             let index = structure.position(name)?;
             End::from(structure.fields.get(index)?).number()?;
-            Some(with(path, Step::Field(index)))
+            Some(with(path, PathStep::Field(index)))
         })
         .collect()
 }
@@ -64,7 +68,7 @@ fn numbers(structure: &Struct, path: &[Step], names: &[&str]) -> Option<Vec<Vec<
 /// The stamp that `end` is or, for a header, holds; `depth` is how far structs are looked into.
 pub(super) fn stamp_at(
     schema: &Schema,
-    path: &[Step],
+    path: &[PathStep],
     end: End,
     unit: TimeUnit,
     depth: u8,
@@ -82,7 +86,7 @@ pub(super) fn stamp_at(
     let integer = |wanted: fn(&str) -> bool| {
         let index = structure.fields.iter().position(|f| wanted(&f.name))?;
         let number = End::from(structure.fields.get(index)?).number()?;
-        (!number.is_float()).then(|| with(path, Step::Field(index)))
+        (!number.is_float()).then(|| with(path, PathStep::Field(index)))
     };
     if let (Some(sec), Some(nanos)) = (integer(is_seconds), integer(is_nanos)) {
         return Some(StampFields {
@@ -97,13 +101,13 @@ pub(super) fn stamp_at(
 /// The best stamp among a struct's fields and its header's.
 pub(super) fn stamp_in(
     schema: &Schema,
-    path: &[Step],
+    path: &[PathStep],
     structure: &Struct,
     depth: u8,
 ) -> Option<(u8, StampFields)> {
     let mut best: Option<(u8, StampFields)> = None;
     for (index, field) in structure.fields.iter().enumerate() {
-        let path = with(path, Step::Field(index));
+        let path = with(path, PathStep::Field(index));
         let end = End::from(field);
         let found = match names::meaning(&field.name) {
             Some(Meaning::Stamp { rank, unit }) => {
@@ -124,46 +128,46 @@ pub(super) fn stamp_in(
 }
 
 /// A string of this name in the struct at `path`, or in its header.
-pub(super) fn text_near(schema: &Schema, path: &[Step], name: &str) -> Option<Vec<Step>> {
+pub(super) fn text_near(schema: &Schema, path: &[PathStep], name: &str) -> Option<Vec<PathStep>> {
     let structure = end_of(schema, path)?.structure(schema)?;
     let is_text = |f: &Field| f.kind == Kind::Text && f.many == Many::One;
     if let Some(index) = structure.position(name)
         && structure.fields.get(index).is_some_and(is_text)
     {
-        return Some(with(path, Step::Field(index)));
+        return Some(with(path, PathStep::Field(index)));
     }
     let header = structure.position("header")?;
     let inner = End::from(structure.fields.get(header)?).structure(schema)?;
     let index = inner.position(name)?;
     let found = inner.fields.get(index).is_some_and(is_text);
-    found.then(|| with(&with(path, Step::Field(header)), Step::Field(index)))
+    found.then(|| with(&with(path, PathStep::Field(header)), PathStep::Field(index)))
 }
 
 /// Every struct on the way, the innermost first, the message itself last.
-pub(super) fn structs_on(schema: &Schema, path: &[Step]) -> Vec<Vec<Step>> {
+pub(super) fn structs_on(schema: &Schema, path: &[PathStep]) -> Vec<Vec<PathStep>> {
     (0..path.len())
         .rev()
         .filter_map(|n| path.get(..n))
         .filter(|prefix| end_of(schema, prefix).is_some_and(|e| e.structure(schema).is_some()))
-        .map(<[Step]>::to_vec)
+        .map(<[PathStep]>::to_vec)
         .collect()
 }
 
-pub(super) fn end_of(schema: &Schema, path: &[Step]) -> Option<End> {
+pub(super) fn end_of(schema: &Schema, path: &[PathStep]) -> Option<End> {
     let mut end = End {
         kind: Kind::Struct(schema.root),
         many: Many::One,
     };
     for step in path {
         match step {
-            Step::Field(index) => end = End::from(end.structure(schema)?.fields.get(*index)?),
-            Step::At(_) | Step::Each => end.many = Many::One,
+            PathStep::Field(index) => end = End::from(end.structure(schema)?.fields.get(*index)?),
+            PathStep::At(_) | PathStep::Each => end.many = Many::One,
         }
     }
     Some(end)
 }
 
-pub(super) fn with(path: &[Step], step: Step) -> Vec<Step> {
+pub(super) fn with(path: &[PathStep], step: PathStep) -> Vec<PathStep> {
     let mut longer = Vec::with_capacity(path.len() + 1);
     longer.extend_from_slice(path);
     longer.push(step);

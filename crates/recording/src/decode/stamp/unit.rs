@@ -228,7 +228,7 @@ pub(crate) fn units_of_steps(
 
 /// Result of the first messages of a log.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Told {
+pub(crate) enum UnitEvidence {
     /// The unit of their stamps.
     Unit(TimeUnit),
     /// Nothing: there are no two different stamps.
@@ -241,10 +241,13 @@ pub(crate) enum Told {
 ///
 /// # Errors
 /// Several or none, or what speaks for one does so for different ones.
-pub(crate) fn unit_in_log(first: &[(Nanos, Vec<Bare>)], few: usize) -> Result<Told, Ambiguous> {
+pub(crate) fn unit_in_log(
+    first: &[(Nanos, Vec<Bare>)],
+    few: usize,
+) -> Result<UnitEvidence, Ambiguous> {
     let opening = Opening::of(first.iter().take(few).flat_map(|(_, bare)| bare).copied());
     if opening.step.is_none() {
-        return Ok(Told::Nothing);
+        return Ok(UnitEvidence::Nothing);
     }
     let by_clock = first.iter().find_map(|(log, bare)| {
         let bare = bare.first().filter(|bare| bare.0 != 0)?;
@@ -265,7 +268,7 @@ pub(crate) fn unit_in_log(first: &[(Nanos, Vec<Bare>)], few: usize) -> Result<To
                 .filter(|unit| ours.is_none_or(|ours| ours == *unit))
         }
     };
-    let told = told.map(Told::Unit);
+    let told = told.map(UnitEvidence::Unit);
     told.ok_or_else(|| opening.or(by_speed).ambiguous())
 }
 

@@ -5,7 +5,7 @@
 
 use super::super::clock::Clock;
 use super::instants::Instants;
-use super::roles::{Chosen, Roles, place};
+use super::roles::{RoleColumns, Roles, place};
 use crate::columns::{Kind, Meant, Role, Unit};
 use crate::decode::{Bare, bare_of_text, units_of_steps};
 use strapd_attitude::diagnostic::Diagnostic;
@@ -138,7 +138,7 @@ impl Roles<'_> {
         &self,
         period: Option<i64>,
         notes: &mut Vec<String>,
-    ) -> Result<Option<Chosen>, Diagnostic> {
+    ) -> Result<Option<RoleColumns>, Diagnostic> {
         let Some(found) = self.chosen(Kind::Push, notes)? else {
             return Ok(None);
         };

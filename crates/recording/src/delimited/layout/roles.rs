@@ -36,20 +36,20 @@ pub(super) struct Group {
 }
 
 /// Columns that are one.
-pub(super) struct Chosen {
+pub(super) struct RoleColumns {
     pub(super) columns: Vec<usize>,
     pub(super) unit: Option<Unit>,
 }
 
 /// Roles of a table with the columns that fill them.
 struct Fillings {
-    gyro: Option<Chosen>,
-    accel: Option<Chosen>,
-    mag: Option<Chosen>,
-    orientation: Option<Chosen>,
-    matrix: Option<Chosen>,
-    turn: Option<Chosen>,
-    push: Option<Chosen>,
+    gyro: Option<RoleColumns>,
+    accel: Option<RoleColumns>,
+    mag: Option<RoleColumns>,
+    orientation: Option<RoleColumns>,
+    matrix: Option<RoleColumns>,
+    turn: Option<RoleColumns>,
+    push: Option<RoleColumns>,
 }
 
 /// Index of a column that the user names, or gives by its number from 1.
@@ -137,10 +137,10 @@ pub(super) fn axes_of_maker(names: &[Name], maker: Maker, kind: Kind) -> Option<
 }
 
 /// Role of a table: its columns, its kind, and what a column of it is by its part.
-type Filling<'c> = (Option<&'c Chosen>, Kind, fn(usize) -> Column);
+type Filling<'c> = (Option<&'c RoleColumns>, Kind, fn(usize) -> Column);
 
 /// Columns with what each of them is, and the words that would give them so.
-type Placed = (Vec<(usize, Column)>, Vec<String>);
+type RolePlacement = (Vec<(usize, Column)>, Vec<String>);
 
 impl Fillings {
     /// Each role with its columns, and what a column of it is by its part.
@@ -162,7 +162,7 @@ impl Fillings {
 
     /// States units and factors of the columns in the table; `period` is the time from row to row in ns.
     fn declare_units(&self, table: &mut Table, period: Option<i64>) {
-        let unit = |chosen: &Option<Chosen>| chosen.as_ref().and_then(|chosen| chosen.unit);
+        let unit = |chosen: &Option<RoleColumns>| chosen.as_ref().and_then(|chosen| chosen.unit);
         let mut scales = Scales::default();
         if let Some(Unit::Rate(unit, scale)) = unit(&self.gyro) {
             table.declared.gyro_unit = Some(unit);
@@ -268,7 +268,11 @@ impl Roles<'_> {
     ///
     /// # Errors
     /// A column that fills two roles.
-    fn placed(&self, fillings: &Fillings, instants: &Instants) -> Result<Placed, Diagnostic> {
+    fn placed(
+        &self,
+        fillings: &Fillings,
+        instants: &Instants,
+    ) -> Result<RolePlacement, Diagnostic> {
         let mut of: Vec<(usize, Column)> = Vec::new();
         let mut assumed = Vec::new();
         for (chosen, kind, column) in fillings.each() {
@@ -317,7 +321,7 @@ impl Roles<'_> {
         &self,
         kind: Kind,
         notes: &mut Vec<String>,
-    ) -> Result<Option<Chosen>, Diagnostic> {
+    ) -> Result<Option<RoleColumns>, Diagnostic> {
         if let Some(given) = self.given_of(Role::Of(kind)) {
             if given.columns.is_empty() {
                 return Ok(None);
@@ -329,7 +333,7 @@ impl Roles<'_> {
                 Some(unit) => Some(unit),
                 None => self.unit(kind, &columns, notes)?.flatten(),
             };
-            return Ok(Some(Chosen { columns, unit }));
+            return Ok(Some(RoleColumns { columns, unit }));
         }
         let mut groups = candidates(self.names, kind);
         if kind == Kind::Accel && self.is_physics_toolbox() {
@@ -380,7 +384,7 @@ impl Roles<'_> {
         let Some(unit) = self.unit(kind, &columns, notes)? else {
             return Ok(None);
         };
-        Ok(Some(Chosen { columns, unit }))
+        Ok(Some(RoleColumns { columns, unit }))
     }
 
     /// The unit of these columns, by their names, or by what the maker's documents say; `None` where a role that can be

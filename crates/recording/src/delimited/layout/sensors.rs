@@ -4,7 +4,7 @@
 //! row in another, and which it is shows in the first rows. Two bodies in one table are never mixed.
 
 use super::super::column::Column;
-use super::roles::{Chosen, Roles, place};
+use super::roles::{RoleColumns, Roles, place};
 use crate::columns::{Meant, Role};
 use std::collections::BTreeSet;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -44,7 +44,7 @@ impl Roles<'_> {
     ///
     /// # Errors
     /// A column that is given and not there.
-    pub(super) fn whose(&self, rate: Option<&Chosen>) -> Result<Whose, Diagnostic> {
+    pub(super) fn whose(&self, rate: Option<&RoleColumns>) -> Result<Whose, Diagnostic> {
         if let Some(given) = self.given_of(Role::Sensor) {
             let places = given.columns.iter().map(|name| place(self.names, name));
             let columns: Result<Vec<usize>, String> = places.collect();
@@ -104,13 +104,13 @@ impl Roles<'_> {
         })
     }
 
-    fn has_rate(&self, row: &[String], rate: &Chosen) -> bool {
+    fn has_rate(&self, row: &[String], rate: &RoleColumns) -> bool {
         let is_filled = |at: &usize| row.get(*at).is_some_and(|cell| !cell.is_empty());
         rate.columns.iter().all(is_filled)
     }
 
     /// Values of a column in those of the first rows that hold a rate: of others it may name the kind of a row.
-    fn values(&self, at: usize, rate: &Chosen) -> Values {
+    fn values(&self, at: usize, rate: &RoleColumns) -> Values {
         let rows = self.rows.iter().filter(|row| self.has_rate(row, rate));
         let cells: Vec<&str> = rows
             .filter_map(|row| row.get(at))

@@ -61,7 +61,7 @@ fn read(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<ProblemKind>) {
     while from < log.len() {
         have = (have + piece).min(log.len());
         let is_end = have == log.len();
-        while let Step::Used(n) = transcriber.step(&log[from..have], is_end, &mut to) {
+        while let ReadProgress::Used(n) = transcriber.step(&log[from..have], is_end, &mut to) {
             from += n;
             if from >= have {
                 break;

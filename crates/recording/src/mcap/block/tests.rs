@@ -76,7 +76,7 @@ fn a_packed_chunk_has_no_more_messages_than_its_bytes_can_tell_apart() {
                 crc: 0,
                 indexed: None,
             },
-            payload: Payload::Held(Held {
+            payload: Payload::Held(OwnedBytes {
                 range: 0..packed.len(),
                 bytes: packed,
             }),

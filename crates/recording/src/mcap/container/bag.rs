@@ -40,7 +40,7 @@ pub(in super::super) struct Scanner {
 }
 
 /// Fields of a head that are kept while the tape moves on.
-struct Kept {
+struct RecordHead {
     op: u8,
     total: u64,
     data_at: usize,
@@ -52,10 +52,10 @@ struct Kept {
     index: Option<(u64, u32)>,
 }
 
-impl Kept {
-    fn of(head: &Head<'_>) -> Kept {
+impl RecordHead {
+    fn of(head: &Head<'_>) -> RecordHead {
         let name = head.compression.unwrap_or_default();
-        Kept {
+        RecordHead {
             op: head.op,
             total: head.total() as u64,
             data_at: head.data_at,
@@ -86,14 +86,14 @@ impl Scanner {
     }
 
     /// The head of the record here; `None` at the end, and where none was and the next chunk was looked for.
-    fn head(&mut self) -> io::Result<Option<Kept>> {
+    fn head(&mut self) -> io::Result<Option<RecordHead>> {
         let at = self.tape.position();
         let mut need = 4;
         loop {
             let ahead = self.tape.available(need, PEEK.max(need))?;
             let have = ahead.len();
             match bag::head(ahead) {
-                Ok(head) => return Ok(Some(Kept::of(&head))),
+                Ok(head) => return Ok(Some(RecordHead::of(&head))),
                 Err(Some(more)) if have >= need => need = more.max(need + 1),
                 Err(Some(_)) => {
                     self.end(at, need as u64, have as u64);
@@ -120,7 +120,7 @@ impl Scanner {
     }
 
     /// A chunk, or one record that is handled as a chunk of one.
-    fn chunk(&mut self, at: u64, kept: &Kept) -> io::Result<Option<Item>> {
+    fn chunk(&mut self, at: u64, kept: &RecordHead) -> io::Result<Option<Item>> {
         let is_chunk = kept.op == op::CHUNK;
         let compression = if is_chunk {
             kept.compression
@@ -278,7 +278,7 @@ impl Scanner {
     }
 
     /// Adds up the messages of one chunk by the index: pairs of connection and count.
-    fn chunk_info(&mut self, at: u64, kept: &Kept) -> io::Result<()> {
+    fn chunk_info(&mut self, at: u64, kept: &RecordHead) -> io::Result<()> {
         let total = usize::try_from(kept.total).unwrap_or(usize::MAX);
         if self.has(kept.total)? {
             let ahead = self.tape.available(total, total)?;

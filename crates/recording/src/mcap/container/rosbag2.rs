@@ -6,7 +6,7 @@
 use super::super::block::{Block, Payload};
 use super::super::input::{Input, LogFile};
 use super::super::scan::{Facts, Item};
-use super::super::{Beside, Limits};
+use super::super::{DatabaseSidecars, Limits};
 use super::pages::FilePages;
 use super::{Container, Spare};
 use crate::format::Format;
@@ -23,7 +23,7 @@ const RUN: usize = 1 << 20;
 #[derive(Debug)]
 pub(in super::super) struct Scanner {
     /// Files to be opened: the database, and those beside it.
-    files: Option<(Arc<LogFile>, Beside)>,
+    files: Option<(Arc<LogFile>, DatabaseSidecars)>,
     limits: Limits,
     open: Option<(FilePages, Bag)>,
     problems: Problems,
@@ -34,7 +34,7 @@ pub(in super::super) struct Scanner {
 }
 
 impl Scanner {
-    pub(super) fn new(input: Input, beside: Beside, limits: Limits) -> Self {
+    pub(super) fn new(input: Input, beside: DatabaseSidecars, limits: Limits) -> Self {
         let files = match input {
             Input::File(file) => Some((file, beside)),
             Input::Stream { .. } => None,
@@ -51,7 +51,12 @@ impl Scanner {
         }
     }
 
-    fn begin(&mut self, file: Arc<LogFile>, beside: Beside, to: &mut Transcript) -> io::Result<()> {
+    fn begin(
+        &mut self,
+        file: Arc<LogFile>,
+        beside: DatabaseSidecars,
+        to: &mut Transcript,
+    ) -> io::Result<()> {
         let mut faults = Vec::new();
         let opened = FilePages::open(file, beside.wal, &mut faults)?;
         if beside.has_journal {

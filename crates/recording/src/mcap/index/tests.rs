@@ -38,7 +38,7 @@ fn statistics(counts: &[(u16, u64)], chunks: u32) -> Statistics {
 }
 
 fn index(chunks: &[ChunkIndex<'_>], counts: &[(u16, u64)]) -> Option<Index> {
-    let mut gathered = Gathered::default();
+    let mut gathered = ChunkList::default();
     for chunk in chunks {
         gathered.add(chunk, Limits::default());
     }
@@ -98,7 +98,7 @@ fn an_index_that_something_speaks_against_is_not_used() {
         change(&mut chunks[0]);
         assert!(index(&chunks, &COUNTS).is_none(), "{what}");
     }
-    let mut gathered = Gathered::default();
+    let mut gathered = ChunkList::default();
     three()
         .iter()
         .for_each(|c| gathered.add(c, Limits::default()));
@@ -106,7 +106,7 @@ fn an_index_that_something_speaks_against_is_not_used() {
         gathered.index(&statistics(&COUNTS, 4), 100_000).is_none(),
         "a chunk too few"
     );
-    let mut gathered = Gathered::default();
+    let mut gathered = ChunkList::default();
     three()
         .iter()
         .for_each(|c| gathered.add(c, Limits::default()));

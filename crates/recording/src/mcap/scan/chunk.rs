@@ -6,7 +6,7 @@
 use super::super::block::{Block, Compression, Kind, Payload};
 use super::super::input::Input;
 use super::super::resync;
-use super::{Besides, Item, PEEK, SLACK, Scanner, Section};
+use super::{Item, OtherRecords, PEEK, SLACK, Scanner, Section};
 use crate::records::problem::ProblemKind;
 use crate::records::record::{Body, ChunkHead};
 use crate::records::{HEAD, head_at, op};
@@ -168,7 +168,7 @@ impl Scanner {
                 return Ok(messages);
             };
             let total = length.saturating_add(HEAD as u64);
-            if self.besides == Besides::Everything || !self.tape.may_have(total) {
+            if self.besides == OtherRecords::Everything || !self.tape.may_have(total) {
                 return Ok(messages);
             }
             messages = Some(

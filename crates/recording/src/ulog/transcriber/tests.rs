@@ -52,11 +52,11 @@ fn read(log: &[u8], cut: usize) -> (Vec<u8>, Problems, Transcriber) {
             return (to.bytes, transcriber.problems.clone(), transcriber);
         }
         match transcriber.step(ahead, is_end, &mut to) {
-            Step::Used(n) => {
+            ReadProgress::Used(n) => {
                 assert!(n > 0 && n <= ahead.len(), "{n} of {}", ahead.len());
                 from += n;
             }
-            Step::Need(n) => {
+            ReadProgress::Need(n) => {
                 assert!(!is_end && n > ahead.len(), "{n}, have {}", ahead.len());
                 until = (until + cut).min(log.len());
             }

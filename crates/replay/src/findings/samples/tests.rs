@@ -6,7 +6,7 @@ use crate::finding::{Finding, Severity};
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::{GravityAxis, Quality};
 use strapd_attitude::condition::{Clock, GyroUnit};
-use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::estimate::{EstimationSettings, Meaning};
 use strapd_attitude::record::{Counts, Declared, Nanos, RawSample, Verdict};
 use strapd_recording::recording::payload_type::PayloadType;
 
@@ -33,7 +33,7 @@ fn looked(raw: &[RawSample]) -> Inspection {
         of: "/imu".to_owned(),
         described: PayloadType::of_memory("imu [cdr]"),
         frame: String::new(),
-        resolved: Meaning::new(&Plan::default(), &Declared::default()),
+        resolved: Meaning::new(&EstimationSettings::default(), &Declared::default()),
         kind_stated: true,
         quality: quality.summary(),
         quality_unit: GyroUnit::Rad,

@@ -32,25 +32,25 @@ pub trait Object: Debug + Send + Sync {
 }
 
 /// Object or listing at an address.
-pub enum Found {
+pub enum RemoteSource {
     /// Something that can be read anywhere.
     Object(Arc<dyn Object>),
     /// Something that comes once, from its beginning to its end.
     Stream(Box<dyn Read + Send>),
 }
 
-impl std::fmt::Debug for Found {
+impl std::fmt::Debug for RemoteSource {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Found::Object(object) => write!(f, "Found({object:?})"),
-            Found::Stream(_) => f.write_str("Found(a stream)"),
+            RemoteSource::Object(object) => write!(f, "Found({object:?})"),
+            RemoteSource::Stream(_) => f.write_str("Found(a stream)"),
         }
     }
 }
 
 /// Way to an address: what is there, or why it cannot be had. The text does not begin with the address, and holds no
 /// part of it that is not printed.
-pub type Way = fn(&Address) -> Result<Found, Diagnostic>;
+pub type Way = fn(&Address) -> Result<RemoteSource, Diagnostic>;
 
 static WAY: OnceLock<Way> = OnceLock::new();
 
@@ -75,7 +75,7 @@ pub fn meant(text: &str) -> Option<Address> {
 ///
 /// # Errors
 /// It names a user; nobody knows the way; whatever the way finds.
-pub(crate) fn find(address: &Address) -> Result<Found, Diagnostic> {
+pub(crate) fn find(address: &Address) -> Result<RemoteSource, Diagnostic> {
     if address.names_a_user() {
         return Err(
             Diagnostic::new("an address with a user or a password is not taken").help(

@@ -3,7 +3,7 @@
 //! What an estimator remembers means something else under other settings. The text that is hashed is nowhere: many
 //! sensors are born at once.
 
-use super::plan::Plan;
+use super::plan::EstimationSettings;
 use super::preparation::Prepared;
 use crate::frames::AxisMap;
 use crate::{condition, propagate};
@@ -22,9 +22,9 @@ impl Write for Fnv {
 }
 
 /// The number of every setting under which what is remembered means something else.
-pub(super) fn settings_number(
+pub(super) fn settings_fingerprint(
     settings: &condition::Settings,
-    plan: &Plan,
+    plan: &EstimationSettings,
     prepared: &Prepared,
     noise: &propagate::Noise,
 ) -> u64 {

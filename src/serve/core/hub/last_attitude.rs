@@ -2,7 +2,7 @@
 
 use super::{Client, ClientProtocol, Hub, read};
 use crate::serve::core::channel::{Channel, Clock};
-use crate::serve::core::last::{Last, Wanted};
+use crate::serve::core::last_attitude::{Last, Wanted};
 use crate::serve::protocol::filter::Filter;
 use crate::serve::protocol::foxglove::frames::{TRANSFORMS, stream_of};
 use crate::sink::Profile;
