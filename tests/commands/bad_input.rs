@@ -6,7 +6,7 @@
 
 mod files;
 
-use strapd_attitude::condition::{self, Conditioner, OnGap};
+use strapd_attitude::condition::{self, Conditioner, OnGap, StampRepair};
 use strapd_attitude::estimate::settings;
 use strapd_attitude::propagate::{
     self, LARGEST_WINDOW, Method, Order, Placement, Propagator, Sequential, Settings,
@@ -275,13 +275,27 @@ const CASES: &[Case] = &[
         },
     },
     Case {
-        name: "a negative step: a clock set back",
-        settings: as_it_is,
+        name: "a negative step: a clock set back, and so is the log's",
+        settings: |settings| settings.repair = StampRepair::AsRecorded,
         samples: |kind| holed(kind, -3_600_000_000_000),
         check: |run, _, _| {
             assert_eq!(run.conditioning.gaps.jumps_back, 1);
             assert_eq!(run.out.len(), 120);
             assert!(run.turned(60) < 1e-15 && run.out[60].status.has(Status::HELD));
+        },
+    },
+    Case {
+        name: "a clock set back while the log's goes on",
+        settings: as_it_is,
+        samples: |kind| holed(kind, -3_600_000_000_000),
+        check: |run, _, _| {
+            assert_eq!(run.conditioning.gaps.jumps_back, 0);
+            assert_eq!(run.out.len(), 120);
+            assert!(
+                run.out
+                    .iter()
+                    .all(|sample| !sample.status.has(Status::HELD))
+            );
         },
     },
     Case {

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 use strapd_attitude::condition::regularise::{Lines, Regulariser, Report, Survey, Value};
-use strapd_attitude::condition::{Conditioner, Settings as Conditioning};
+use strapd_attitude::condition::{Conditioner, Settings as Conditioning, StampRepair};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
 use strapd_attitude::quaternion::Quaternion;
@@ -104,6 +104,8 @@ fn log(seed: u64, kind: SampleKind, faults: Faults) -> Log {
 fn conditioned(raw: &[RawSample], kind: SampleKind) -> Vec<RateSample> {
     let settings = Conditioning {
         kind,
+        // As an estimation whose stamps are straightened has them.
+        repair: StampRepair::AsRecorded,
         ..Conditioning::default()
     };
     let mut conditioner = Conditioner::new(&settings).unwrap();

@@ -340,7 +340,7 @@ fn what_is_missing_is_asked_for_and_a_flag_that_says_nothing_is_refused() {
     strapd(at, "replay timeless.csv -o null:").refused(
         1,
         &[
-            "no row says when",
+            "neither the message stamps nor the log time advance",
             "--time index --rate-hz",
             "--columns stamp=",
         ],

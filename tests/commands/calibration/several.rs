@@ -13,7 +13,7 @@ fn resting(dir: &Path, name: &str, secs: u32) {
             let noise = |k: u32| 1e-3 * (f64::from((i * 7919 + k * 101) % 1009) / 1009.0 - 0.5);
             json!({
                 "class": "RATE", "id": "imu", "stamp": {"sec": i / 100, "nsec": i % 100 * 10_000_000},
-                "gyro": [0.01 + noise(0), noise(1), noise(2)], "accel": [9.81 + noise(3), noise(4), noise(5)],
+                "gyro": [0.01 + noise(0), 0.004 + noise(1), noise(2) - 0.003], "accel": [9.81 + noise(3), noise(4), noise(5)],
             })
             .to_string()
         })

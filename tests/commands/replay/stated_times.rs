@@ -389,8 +389,8 @@ fn no_gap_is_advised_to_be_bridged_that_is_a_clock_being_set() {
         )
         .unwrap();
         let found = findings(&checked);
-        let held = found.iter().find(|f| f.code == "gap-held").unwrap();
-        crate::check::flags(held)
+        assert!(found.iter().any(|f| f.code == "clock-set"), "{found:?}");
+        found.iter().map(crate::check::flags).collect::<String>()
     };
     // A receiver finds the time of day after 3 s; a clock is set back by 2 s.
     let found = flags("set.mcap", |t| {
@@ -400,10 +400,7 @@ fn no_gap_is_advised_to_be_bridged_that_is_a_clock_being_set() {
             t
         }
     });
-    assert!(
-        !found.contains("--max-gap") && found.contains("--time"),
-        "{found}"
-    );
+    assert!(!found.contains("--max-gap"), "{found}");
     let back = flags("back.mcap", |t| {
         if t - START < 3 * SECOND {
             t
@@ -411,10 +408,7 @@ fn no_gap_is_advised_to_be_bridged_that_is_a_clock_being_set() {
             t - 2 * SECOND
         }
     });
-    assert!(
-        !back.contains("--max-gap") && back.contains("--time"),
-        "{back}"
-    );
+    assert!(!back.contains("--max-gap"), "{back}");
 }
 
 #[test]

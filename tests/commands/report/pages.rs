@@ -35,7 +35,7 @@ fn a_spike_of_one_sample_is_seen() {
     let dir = tempfile::tempdir().unwrap();
     let mut samples = motion(30_000);
     samples[12_345].gyro[1] = 30.0;
-    let (html, _) = page(dir.path(), &samples, "");
+    let (html, _) = page(dir.path(), &samples, "--spikes keep");
     let rate = figure(&html, "rate").unwrap();
     // Three lines of at most four points in each of 1400 stretches.
     assert!(drawn(rate).len() < 17_000);

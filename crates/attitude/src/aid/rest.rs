@@ -175,7 +175,7 @@ impl Rest {
             .sum::<Vector3<f64>>()
             / (count - 1.0);
         // What is known of the bias is in `off` alone.
-        let is_sole = !self.has_moved && !self.is_certain;
+        let is_sole = settings.rest_by_direction && !self.has_moved && !self.is_certain;
         if self.changes(&scatter) || is_sole && is_solely_vertical(&(whole - mean + off), &up) {
             return None;
         }

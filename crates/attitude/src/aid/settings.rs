@@ -21,6 +21,9 @@ pub struct Settings {
     /// Largest sigma of the bias by which a steady turn about the vertical is told from it, rad/s: that of the sensor's
     /// class where the prior is wider.
     pub bias_class: f64,
+    /// Whether a rate along the vertical alone, of a body that has done nothing else, is taken for a turn and not for a
+    /// bias: of recordings, whose later rests were looked at. Of one real sensor in some its bias points so.
+    pub rest_by_direction: bool,
     /// Prior sigma of the gyro's scale factors.
     pub scale_prior: f64,
     /// Prior sigma of the angles between its axes, rad.
@@ -134,6 +137,7 @@ impl Default for Settings {
             rate_noise: 7e-5,
             bias_prior: 0.02,
             bias_class: f64::INFINITY,
+            rest_by_direction: false,
             scale_prior: 4e-3,
             cross_prior: 2e-3,
             force_bias_prior: 0.02,

@@ -20,7 +20,7 @@ pub(super) use unwrap::Turns;
 use super::repairs::StampRepair;
 use crate::diagnostic::Diagnostic;
 use crate::record::{Nanos, RawSample};
-use crate::setting::{RATE_HZ, TIME};
+use crate::setting::{COLUMNS, FIELD, RATE_HZ, TIME};
 
 /// Clock of a sample that is believed (`--time`).
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -122,7 +122,9 @@ impl From<&ClockWarning> for Diagnostic {
                 return Diagnostic::new(
                     "neither the message stamps nor the log time advance: integration needs time",
                 )
-                .help(format!("{TIME} index {RATE_HZ} HZ"))
+                .help(format!(
+                    "{TIME} index {RATE_HZ} HZ, or where the time stands: {COLUMNS} stamp=NAME:UNIT of a table, {FIELD} stamp=PATH of a message"
+                ))
                 .coded("clock");
             }
         };

@@ -4,7 +4,7 @@
 
 use super::plan::EstimationSettings;
 use super::sensor_calibration::SensorCalibration;
-use crate::condition::{Clock, GyroUnit, Settings};
+use crate::condition::{Clock, GyroUnit, Settings, StampRepair};
 use crate::frames::{AxisMap, Body, BodyAxes, Dcm, In, Nav, Sensor};
 use crate::quaternion::{BodyRate, DeltaAngle, Quaternion};
 use crate::record::{AccelUnit, Declared, RawSample, SampleKind, TimeUnit};
@@ -141,7 +141,11 @@ impl Meaning {
             spikes: plan.spikes,
             start: plan.start,
             until: plan.until,
-            repair: plan.stamps,
+            repair: match plan.regularise_stamps {
+                // Lines through the stamps find where a clock was set.
+                true => StampRepair::AsRecorded,
+                false => plan.stamps,
+            },
             ..Settings::default()
         }
     }

@@ -286,7 +286,8 @@ impl Preparation {
         }
         // A run that begins later, and a method that waits for nothing, has the first sample alone.
         let is_read_ahead = !is_live(plan.method);
-        aiding = aiding.map(|aiding| {
+        aiding = aiding.map(|mut aiding| {
+            aiding.settings.rest_by_direction = is_read_ahead && patience == Patience::WholeLog;
             if is_read_ahead && plan.start.is_none() {
                 aiding.levelled_by_mean(&resolved, &first, &beside)
             } else {

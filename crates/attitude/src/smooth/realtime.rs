@@ -43,6 +43,7 @@ pub(super) fn run<S: Samples>(
     let settings = aid::Settings {
         bias_prior: class,
         bias_class: class,
+        rest_by_direction: true,
         gyro_range: with.1.gyro_range * NEAR_RANGE,
         ..usual
     };

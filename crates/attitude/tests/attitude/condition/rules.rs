@@ -3,7 +3,8 @@
 use super::{STEP, T0, at, run, sample};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use strapd_attitude::condition::{
-    Clock, ClockWarning, Conditioner, GAPS_KEPT, GyroUnit, OnGap, Settings, choose_clock,
+    Clock, ClockWarning, Conditioner, GAPS_KEPT, GyroUnit, OnGap, Settings, SpikePolicy,
+    StampRepair, choose_clock,
 };
 use strapd_attitude::frames::Dcm;
 use strapd_attitude::quaternion::BodyRate;
@@ -180,6 +181,14 @@ fn two_swapped_packets_are_put_back() {
     assert!(out.is_sorted_by_key(|s| s.stamp));
 }
 
+/// Settings by which stamps are taken as they are, whatever the time of the log says.
+fn as_recorded() -> Settings {
+    Settings {
+        repair: StampRepair::AsRecorded,
+        ..Settings::default()
+    }
+}
+
 /// The clock of samples from `from` on is set by `by` nanoseconds.
 fn set_clock(raw: &mut [RawSample], from: usize, by: i64) {
     for r in &mut raw[from..] {
@@ -204,7 +213,7 @@ fn a_clock_set_back_is_held_and_costs_one_interval() {
             set_clock(&mut raw, 150, -back);
             let settings = Settings {
                 reorder_window: window,
-                ..Settings::default()
+                ..as_recorded()
             };
             let (out, report) = run(&settings, &raw);
             assert_eq!(report.gaps.jumps_back, 1, "back {back}, window {window}");
@@ -225,7 +234,7 @@ fn a_clock_set_back_resets_when_asked() {
     set_clock(&mut raw, 150, -1_000_000_000);
     let settings = Settings {
         on_gap: OnGap::Reset,
-        ..Settings::default()
+        ..as_recorded()
     };
     let (out, _) = run(&settings, &raw);
     assert_eq!(out[150].join, Join::Reset);
@@ -236,7 +245,7 @@ fn a_clock_set_back_resets_when_asked() {
 fn a_clock_set_forward_is_held_and_nothing_is_lost() {
     let mut raw = stream(300);
     set_clock(&mut raw, 150, 200_000_000_000_000_000);
-    let (out, report) = run(&Settings::default(), &raw);
+    let (out, report) = run(&as_recorded(), &raw);
     assert_eq!(out.len(), 300);
     assert_eq!(out[150].join, Join::Hold);
     assert_eq!(report.gaps.count, 1);
@@ -646,6 +655,8 @@ fn components_at_the_range_are_flagged() {
     ] {
         let settings = Settings {
             gyro_range: Some(RANGE),
+            // Alone at the range it is a spike as well.
+            spikes: SpikePolicy::Keep,
             ..kind(k)
         };
         let mut raw: Vec<RawSample> = (0..200)
