@@ -6,7 +6,7 @@
 
 mod files;
 
-use strapd_attitude::condition::{self, Conditioner, OnGap, StampRepair};
+use strapd_attitude::condition::{self, Conditioner, OnGap};
 use strapd_attitude::estimate::settings;
 use strapd_attitude::propagate::{
     self, LARGEST_WINDOW, Method, Order, Placement, Propagator, Sequential, Settings,
@@ -140,8 +140,18 @@ fn own_error(method: Method, angle: f64) -> f64 {
 
 fn as_it_is(_: &mut condition::Settings) {}
 
-/// Samples with a hole of `nanos` before sample 60 of 120.
+/// Samples with a hole of `nanos` before sample 60 of 120, by every clock.
 fn holed(kind: SampleKind, nanos: i64) -> Vec<RawSample> {
+    let mut samples = set(kind, nanos);
+    for s in &mut samples[60..] {
+        s.log = Nanos(s.log.0 + nanos);
+        s.publish = Nanos(s.publish.0 + nanos);
+    }
+    samples
+}
+
+/// Samples whose own clock was set by `nanos` before sample 60 of 120.
+fn set(kind: SampleKind, nanos: i64) -> Vec<RawSample> {
     let mut samples = even(kind, 120);
     for s in &mut samples[60..] {
         s.header = s.header.map(|h| Nanos(h.0 + nanos));
@@ -276,7 +286,7 @@ const CASES: &[Case] = &[
     },
     Case {
         name: "a negative step: a clock set back, and so is the log's",
-        settings: |settings| settings.repair = StampRepair::AsRecorded,
+        settings: as_it_is,
         samples: |kind| holed(kind, -3_600_000_000_000),
         check: |run, _, _| {
             assert_eq!(run.conditioning.gaps.jumps_back, 1);
@@ -287,7 +297,7 @@ const CASES: &[Case] = &[
     Case {
         name: "a clock set back while the log's goes on",
         settings: as_it_is,
-        samples: |kind| holed(kind, -3_600_000_000_000),
+        samples: |kind| set(kind, -3_600_000_000_000),
         check: |run, _, _| {
             assert_eq!(run.conditioning.gaps.jumps_back, 0);
             assert_eq!(run.out.len(), 120);
