@@ -4,29 +4,28 @@
 //! seen, and what to say when it cannot be known.
 
 mod bias;
+mod rates;
+mod stamps;
 
 use self::bias::{decide_bias, looks_for_bias, with_bias_of_rest};
+use self::rates::{clipped_at, decide_truncation, looks_for_truncation};
+use self::stamps::{decide_clock, decide_stamps};
 use super::aiding::Aiding;
 use super::class_pass::{self, ClassPass};
 use super::clock_pass::ClockPass;
 use super::first_pass::{FEW, MANY, RestPass};
-use super::intervals::Mismatch;
 use super::meaning::Meaning;
 use super::plan::{Aid, Bias, EstimationSettings, Initial, Noise, Truncation};
 use super::stamps::{StampPass, Stamps};
-use crate::condition::rails::{Clipped, Rails};
+use crate::condition::rails::Rails;
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
-use crate::condition::truncation::Grid;
-use crate::condition::{BatchRate, Clock, ClockWarning, choose_clock_as};
+use crate::condition::{BatchRate, Clock};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Method;
 use crate::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use crate::record::{Nanos, RawSample, SampleKind};
-use crate::setting::{
-    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_RANGE, GYRO_UNIT, INIT,
-    REGULARISE_STAMPS, UNDO_TRUNCATION,
-};
+use crate::setting::{AID, BIAS, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT};
 use crate::worlds::{self, Convention, World};
 use nalgebra::Vector3;
 
@@ -369,51 +368,6 @@ impl Preparation {
     }
 }
 
-/// Decides whose stamps count, and whether they are those of batches.
-fn decide_clock(
-    (plan, resolved): (&EstimationSettings, &Meaning),
-    first: &[RawSample],
-    clocks: Option<ClockPass>,
-    warnings: &mut Vec<Diagnostic>,
-) -> Result<(Clock, Option<BatchRate>), Diagnostic> {
-    let (clock, warning) = choose_clock_as(first, plan.clock, plan.stamps);
-    if let Some(fatal @ ClockWarning::NoneMoves) = warning {
-        return Err(Diagnostic::from(&fatal));
-    }
-    warnings.extend(warning.iter().map(Diagnostic::from));
-    let clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
-    warnings.extend(clocks.of_batches.into_iter().chain(clocks.of_speed));
-    if let Some(mismatch) = Mismatch::between(first, clock, resolved.kind) {
-        if !resolved.interval_unit_given {
-            return Err(mismatch.refusal(resolved.interval.as_ref()));
-        }
-        warnings.push(format!("{mismatch}: what lies between is bridged").into());
-    }
-    Ok((clock, clocks.batches))
-}
-
-/// Decides how stamps are made regular, where that was asked for.
-fn decide_stamps(
-    pass: Option<StampPass>,
-    patience: Patience,
-    warnings: &mut Vec<Diagnostic>,
-) -> Result<Stamps, Diagnostic> {
-    let found = pass.map(StampPass::finish).transpose()?;
-    Ok(match (found, patience) {
-        (None, _) => Stamps::AsRecorded,
-        (
-            Some(Stamps::OnLines {
-                states_interval, ..
-            }),
-            Patience::FirstMinute,
-        ) => {
-            warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers").into());
-            Stamps::Causal { states_interval }
-        }
-        (Some(stamps), _) => stamps,
-    })
-}
-
 /// Settings with what only rest tells, as the beginning of what a filter learns: level by the first specific force,
 /// no bias.
 pub(super) fn learned_on_the_way(plan: &EstimationSettings) -> EstimationSettings {
@@ -507,18 +461,6 @@ pub fn at_once(
     })
 }
 
-/// The range, rad/s, that the samples were clipped at, if they were, and the warning of it.
-fn clipped_at(rails: Option<Rails>, warnings: &mut Vec<Diagnostic>) -> Option<f64> {
-    let (axis, clipped) = rails?.range(1.0)?;
-    let name = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
-    let Clipped { level, samples } = clipped;
-    warnings.push(format!(
-        "gyro {name} stays at exactly {level:.4} rad/s, {samples} samples in all: that is taken for the end of its range, beyond which the rate is unknown; {GYRO_RANGE} RAD_S states another"
-    ).into());
-    // What a bias leaves of it is at the range, too.
-    Some(level.abs() * AT_RANGE)
-}
-
 /// Whether the plan asks for something only rest can tell.
 fn needs_rest(plan: &EstimationSettings) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
@@ -530,83 +472,6 @@ fn is_live(method: Method) -> bool {
         method,
         Method::Live { .. } | Method::CommitProvisional { .. }
     )
-}
-
-/// Whether it is to be seen from the data if their driver has cut them.
-fn looks_for_truncation(plan: &EstimationSettings) -> bool {
-    match plan.truncation {
-        Truncation::Unsaid => plan.aid != Aid::None,
-        Truncation::Auto | Truncation::On => true,
-        Truncation::Steps(_) | Truncation::Off => false,
-    }
-}
-
-/// `rates` are those of a file that can be read twice, where they are looked at. What they do not tell, a calibration
-/// may.
-fn decide_truncation(
-    plan: &EstimationSettings,
-    rates: Option<&[[f64; 3]]>,
-    warnings: &mut Vec<Diagnostic>,
-) -> Result<Option<f64>, Diagnostic> {
-    let known = plan.calibration.as_ref().and_then(|known| known.step());
-    let is_asked = plan.truncation == Truncation::On;
-    match plan.truncation {
-        Truncation::Steps(step) => return Ok(Some(step)),
-        Truncation::Off => return Ok(None),
-        Truncation::On | Truncation::Auto | Truncation::Unsaid => {}
-    }
-    let grid = rates.and_then(Grid::of);
-    match (grid, known) {
-        (Some(grid), _) if is_asked || grid.is_truncated() => {
-            let degrees = grid.step.to_degrees();
-            let why = grid.zero_bin.map_or_else(String::new, |ratio| {
-                format!(" (the one about zero is {ratio:.1} times as wide)")
-            });
-            warnings.push(format!(
-                "the driver cut the rates towards zero in steps of {degrees:.4} deg/s{why}: half a step was put back; {UNDO_TRUNCATION} off leaves them, on={:.6e} does it to a stream",
-                grid.step
-            ).into());
-            Ok(Some(grid.step))
-        }
-        (
-            Some(Grid {
-                zero_bin: Some(ratio),
-                ..
-            }),
-            Some(_),
-        ) => {
-            warnings.push(format!(
-                "{CALIBRATION}: its truncation_step was not used: these rates were not cut (the bin about zero is {ratio:.1} times as wide as the others); {UNDO_TRUNCATION} on=STEP insists"
-            ).into());
-            Ok(None)
-        }
-        (_, Some(step)) => {
-            warnings.push(format!(
-                "the driver cuts the rates towards zero in steps of {:.4} deg/s, says the calibration: half a step was put back; {UNDO_TRUNCATION} off leaves them",
-                step.to_degrees()
-            ).into());
-            Ok(Some(step))
-        }
-        (_, None) if !is_asked => Ok(None),
-        (_, None) => Err(match rates {
-            None => {
-                Diagnostic::new(format!(
-                    "{UNDO_TRUNCATION} on: what cannot be read twice does not show its step in time"
-                ))
-                .help(format!(
-                    "on=STEP in rad/s, as `strapd replay` of a file says it, or a {CALIBRATION} with its truncation_step"
-                ))
-            }
-            Some(_) => {
-                Diagnostic::new(format!(
-                    "{UNDO_TRUNCATION} on: these rates count in no steps"
-                ))
-                .help(
-                    "on=STEP in rad/s states them, off leaves the rates alone",
-                )
-            }
-        }),
-    }
 }
 
 /// `gathered` are the first samples.
