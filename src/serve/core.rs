@@ -8,7 +8,7 @@
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | `run_builder` | lines of one sensor -> a run of its samples | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
-//! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
+//! | [`channel`], [`last_attitude`] | a stream as clients know it; its last attitude, for who comes late | pure |
 //! | [`outbox`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |

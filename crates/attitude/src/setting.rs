@@ -2,7 +2,7 @@
 //!
 //! A stage of its own because a refusal or a warning of a library says which setting helps, and a library does not
 //! know how
-//! that is set: by a flag of a command, an argument in Python, a field of [`EstimationSettings`](crate::estimate::Plan). So its
+//! that is set: by a flag of a command, an argument in Python, a field of [`EstimationSettings`](crate::estimate::EstimationSettings). So its
 //! texts hold a
 //! [`Setting`], which a program that talks to people names in its own way, once, by [`name_settings`] (as
 //! `std::panic::set_hook` does for panics). Until then it is called as a field is: `gyro_unit`.

@@ -45,7 +45,7 @@
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
 //! | [`address`] | an address -> the one form in which it is printed | pure |
-//! | [`elsewhere`] | an address -> what is read there as a file is | I/O |
+//! | [`remote_object`] | an address -> what is read there as a file is | I/O |
 //! | [`text`] | outside text -> what a terminal may show | pure |
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
 //! | [`error`] | why a log cannot be read | |

@@ -20,7 +20,7 @@
 //! | [`selection`], [`topics`], [`log_topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
 //! | `samples`, [`topic_plan`], [`topic_reading`] | how a topic is read, and which messages are its own; all samples that are selected, one topic |
-//! | [`made_before`] | whether it is none, but what strapd made of one |
+//! | [`own_output`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
 
 mod bare_stamps;

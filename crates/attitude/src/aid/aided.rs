@@ -214,7 +214,7 @@ impl AidedPropagator {
         Ok(())
     }
 
-    /// See [`Propagator::succeed`].
+    /// See [`Propagator::continue_counts_of`].
     pub fn continue_counts_of(&mut self, resets: u32) {
         self.propagator.continue_counts_of(resets);
     }

@@ -52,7 +52,7 @@ impl ReplayRequest {
 
     /// Gives the attitudes to `take` as they are made: all streams of the run, the number of one of them, and its next
     /// attitudes. What `take` breaks off ends there, and says so in the summary's counts alone. With
-    /// [`smooth`](strapd_attitude::estimate::Plan::smooth) all of them come at the end.
+    /// [`smooth`](strapd_attitude::estimate::EstimationSettings::smooth) all of them come at the end.
     ///
     /// # Errors
     /// As [`run`].
