@@ -6,7 +6,7 @@ use pyo3::BoundObject;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Known, SensorCalibration};
+use strapd_attitude::estimate::{CalibrationTerm, SensorCalibration};
 
 /// The keys of a calibration that hold text.
 const TEXTS: [&str; 4] = ["strapd_calibration", "sensor", "date", "sources"];
@@ -86,9 +86,9 @@ fn numbers<const N: usize>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64
     Ok(out)
 }
 
-fn part<const N: usize>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Known<N>> {
+fn part<const N: usize>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<CalibrationTerm<N>> {
     let Ok(dict) = value.cast::<PyDict>() else {
-        return Ok(Known {
+        return Ok(CalibrationTerm {
             value: numbers(key, value)?,
             sigma: None,
             observed: [true; N],
@@ -114,7 +114,7 @@ fn part<const N: usize>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Known<N
             }
         },
     };
-    Ok(Known {
+    Ok(CalibrationTerm {
         value: numbers(key, &value)?,
         sigma: get("sigma")?
             .map(|sigma| numbers(key, &sigma))
@@ -144,7 +144,7 @@ pub fn write<'py>(py: Python<'py>, known: &SensorCalibration) -> PyResult<Bound<
 fn put<const N: usize>(
     dict: &Bound<'_, PyDict>,
     key: &str,
-    known: Option<&Known<N>>,
+    known: Option<&CalibrationTerm<N>>,
 ) -> PyResult<()> {
     let Some(known) = known else {
         return Ok(());
