@@ -62,6 +62,7 @@ pub mod diagnostic;
 pub mod digits;
 pub mod estimate;
 pub mod frames;
+mod median;
 pub mod noise;
 pub mod plausible;
 pub mod propagate;

@@ -113,8 +113,8 @@ impl Rest {
         self.swing = Swing::default();
     }
 
-    /// Takes an interval. Returns what the gyro reads at rest, once the body has rested on for long enough since: the mean of the whole spell the first time, then of one interval
-    /// each.
+    /// Takes an interval. Returns what the gyro reads at rest, once the body has rested on for long enough since: the mean
+    /// of the whole spell the first time, then of one interval each.
     pub(super) fn take_interval(
         &mut self,
         interval: &Interval,

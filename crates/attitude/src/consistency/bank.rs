@@ -4,6 +4,7 @@
 //! better than no rotation at all, and stand by a residual as small as that of healthy sensors.
 
 use super::segment::Segment;
+use crate::median::median;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
 use std::sync::LazyLock;
@@ -214,7 +215,10 @@ impl Evidence {
             .iter()
             .filter(|row| evidence_of(row, chosen) > 0.0)
             .count();
-        let (identity, found) = (median(&telling, 0), median(&telling, chosen));
+        let (identity, found) = (
+            median_scatter(&telling, 0),
+            median_scatter(&telling, chosen),
+        );
         let share = agree as f64 / telling.len() as f64;
         let (evidence, nothing) = (self.sums[chosen], self.sums[MAPS]);
         let has_peak = evidence - nothing >= (0.15 * evidence).max(4.0);
@@ -284,16 +288,9 @@ fn evidence_of(row: &[f64], h: usize) -> f64 {
 }
 
 /// Median scatter under a hypothesis, g.
-fn median(rows: &[&Vec<f64>], h: usize) -> f64 {
+fn median_scatter(rows: &[&Vec<f64>], h: usize) -> f64 {
     let mut all: Vec<f64> = rows.iter().filter_map(|row| row.get(h).copied()).collect();
-    all.sort_by(f64::total_cmp);
-    let at = |n: usize| all.get(n).copied().unwrap_or(0.0);
-    let middle = all.len() / 2;
-    let median = match all.len() % 2 {
-        1 => at(middle),
-        _ => 0.5 * (at(middle.saturating_sub(1)) + at(middle)),
-    };
-    median.sqrt()
+    median(&mut all).sqrt()
 }
 
 /// Recorded axes whose place is the same in all maps that are near; `None` where none of them is changed.

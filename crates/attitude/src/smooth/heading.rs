@@ -5,8 +5,9 @@
 
 use super::border::{self, Constants};
 use super::factors::Node;
-use super::segments::{Segment, median};
+use super::segments::Segment;
 use super::settings::HeadingReference;
+use crate::median::median;
 use crate::quaternion::kernel::product;
 use nalgebra::{Rotation3, Vector3};
 

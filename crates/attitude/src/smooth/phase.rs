@@ -385,7 +385,7 @@ fn off_vertical(segments: &[Segment], pushes: &[[f64; 3]]) -> f64 {
             (secs, velocity) = (0.0, Vector3::zeros());
         }
     }
-    super::segments::median(&mut angles)
+    crate::median::median(&mut angles)
 }
 
 #[cfg(test)]

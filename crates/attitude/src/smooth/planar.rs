@@ -10,9 +10,10 @@
 use super::factors::Node;
 use super::realtime::Realtime;
 use super::rests::Run;
-use super::segments::{Segment, median};
+use super::segments::Segment;
 use super::solver::Marginal;
 use super::start::matrix;
+use crate::median::median;
 use crate::quaternion::kernel::{conjugate, normalised, product, turned_in_navigation};
 use nalgebra::{Matrix3, Vector3};
 

@@ -4,6 +4,7 @@
 
 use super::prepared::Prepared;
 use super::rests;
+use crate::median::median;
 use nalgebra::Vector3;
 
 /// Fewer samples than this after the last node do not get one.
@@ -313,16 +314,6 @@ pub(super) fn median_of(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
         let mut values: Vec<f64> = vectors.iter().map(|vector| vector[axis]).collect();
         median(&mut values)
     }))
-}
-
-/// The mean of the two middle ones of an even number; 0 of none.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    match (values.get(n.saturating_sub(1) / 2), values.get(n / 2)) {
-        (Some(a), Some(b)) => 0.5 * (a + b),
-        _ => 0.0,
-    }
 }
 
 /// Fifth percentile, between the two nearest ranks in proportion.

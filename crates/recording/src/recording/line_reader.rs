@@ -118,7 +118,7 @@ fn sensor_of(line: &mut Line, samples: &[RawSample]) -> Option<Key> {
 /// Reads a text to its end, or until `take` has enough.
 ///
 /// # Errors
-/// It cannot be read, or begins with no line of samples; the unit of stamps is not clear; as `take`.
+/// Text that cannot be read, or begins with no line of samples; stamps whose unit is not clear; what `take` fails with.
 pub(super) fn read<R: Read, E: From<Error>>(
     lines: &mut Lines<R>,
     path: &Path,

@@ -4,7 +4,8 @@
 //! taken evenly, or samples that are missing. The rates tell: taken evenly, they change across the end of a batch as much
 //! as inside it (`docs/theory/clocks.md`).
 
-use super::line::{median, median_of, spread};
+use super::line::{median_of, spread};
+use crate::median::median;
 
 /// A step below this share of the mean one lies inside a batch.
 pub(super) const SHORT: f64 = 0.3;
@@ -21,7 +22,7 @@ const SURELY: f64 = 10.0;
 /// Reading one more sample takes less, nanoseconds.
 const READING: f64 = 1e6;
 /// Steps of gyros, nanoseconds: the shortest and the longest.
-const STEPS: (f64, f64) = (20e3, 2e9);
+pub(super) const STEPS: (f64, f64) = (20e3, 2e9);
 /// Fewest samples and batches that tell.
 const LEAST: usize = 24;
 const LEAST_BATCHES: usize = 5;
@@ -110,11 +111,7 @@ pub fn batches(stamps: &[i64], rates: &[[f64; 3]]) -> Batches {
         return Batches::None;
     }
     let mut inner: Vec<f64> = steps.iter().copied().filter(|d| *d < SHORT * h).collect();
-    let inside = if inner.is_empty() {
-        0.0
-    } else {
-        median(&mut inner)
-    };
+    let inside = median(&mut inner);
     let (joined, moving) = change(rates, stamps.len(), &cuts, &took, usual);
     let rate = BatchRate {
         step: h,

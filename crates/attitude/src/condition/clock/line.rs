@@ -1,6 +1,8 @@
-//! Points -> their median, their spread, the line through most of them. Pure.
+//! Points -> their spread, the line through most of them. Pure.
 //!
 //! Apart from the stages that use it because each of them has outliers on one side: messages come late, never early.
+
+use crate::median::median;
 
 /// Points to which a line is fitted at most; of more, evenly chosen ones.
 const MOST: usize = 200;
@@ -22,19 +24,7 @@ pub(crate) fn median_of(values: &mut [i64]) -> i64 {
     }
 }
 
-/// Median; NaN of nothing. Sorted here.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    let at = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => at(middle),
-        _ => 0.5 * (at(middle - 1) + at(middle)),
-    }
-}
-
-/// Spread as a standard deviation, by the median absolute deviation; NaN of nothing.
+/// Spread as a standard deviation, by the median absolute deviation; 0 of none.
 pub(crate) fn spread(values: &[f64]) -> f64 {
     let centre = median(&mut values.to_vec());
     let mut off: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
@@ -65,10 +55,7 @@ pub(crate) fn robust_line(points: &[(f64, f64)]) -> (f64, f64) {
             })
         })
         .collect();
-    let slope = match slopes.is_empty() {
-        true => 0.0,
-        false => median(&mut slopes),
-    };
+    let slope = median(&mut slopes);
     let mut offsets: Vec<f64> = thinned.iter().map(|(x, y)| y - slope * x).collect();
     (slope, median(&mut offsets))
 }
@@ -100,7 +87,6 @@ mod tests {
         assert_eq!(median_of(&mut [4, 1, 2, 3]), 2);
         assert_eq!(median_of(&mut [i64::MAX, i64::MAX]), i64::MAX);
         assert_eq!(median_of(&mut []), 0);
-        assert!(median(&mut []).is_nan());
         assert!((spread(&[1.0, 2.0, 3.0]) - SIGMAS).abs() < 1e-12);
     }
 }

@@ -4,16 +4,16 @@
 //! in the stamps alone shows it. Messages come late, never early, so only the least delay of many tells
 //! (`docs/theory/clocks.md`).
 
-use super::line::{median, robust_line, spread};
+use super::batches::STEPS;
+use super::line::{robust_line, spread};
 use super::steps::ClockSteps;
+use crate::median::median;
 
 /// Samples whose least delay is one point, and most points: beyond, two become one.
 const BLOCK: u64 = 32;
 const MOST_POINTS: usize = 4096;
 /// Fewest points of which a speed is told.
 const LEAST_POINTS: usize = 3;
-/// Mean steps of gyros, nanoseconds: the shortest and the longest.
-const STEPS: (f64, f64) = (20e3, 2e9);
 /// Slower than this a clock stands still.
 const FROZEN: f64 = 1e-5;
 /// Deviations from the speed of the arrival clock: worth a note, a warning, and no clock's.
