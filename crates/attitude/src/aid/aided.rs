@@ -37,13 +37,13 @@ pub enum Start {
 ///
 /// # Example
 /// ```
-/// use strapd_attitude::aid::{self, Aided, Start};
+/// use strapd_attitude::aid::{self, AidedPropagator, Start};
 /// use strapd_attitude::frames::In;
 /// use strapd_attitude::propagate;
 /// use strapd_attitude::quaternion::BodyRate;
 /// use strapd_attitude::record::{Join, Measured, Nanos, RateSample, Status};
 ///
-/// let mut aided = Aided::new(propagate::Settings::default(), aid::Settings::default(), Start::Level)?;
+/// let mut aided = AidedPropagator::new(propagate::Settings::default(), aid::Settings::default(), Start::Level)?;
 /// // At rest for ten seconds, tilted by 0.1 rad; a gyro with a bias of 0.6 deg/s.
 /// let samples: Vec<RateSample> = (0..=1000)
 ///     .map(|i| RateSample {
