@@ -34,7 +34,7 @@ export class Cards extends Map {
     const made = new Card(new Sensor(id, clocks), parts.template, view, {
       moved: this.does.moved,
       resized: this.does.resized,
-      anew: () => this.does.anew(id),
+      anew: (where) => this.does.anew(id, where),
       folded: () => this.count(),
       save: (kind) => this.does.save(made, kind),
     });

@@ -24,6 +24,31 @@ const ROWS = [
 
 const list = (value) => (Array.isArray(value) ? value : [value]);
 
+// A button that acts at its second click: one is easily made, and every reader of the sensor sees the attitude jump.
+class Twice {
+  constructor(button, act) {
+    this.button = button;
+    button.addEventListener("click", () => {
+      clearTimeout(this.timer);
+      const sure = this.sure;
+      this.wait(!sure);
+      if (sure) act();
+      else this.timer = setTimeout(() => this.wait(false), SURE);
+    });
+  }
+
+  wait(sure) {
+    this.sure = sure;
+    this.button.setAttribute("aria-pressed", String(sure));
+    this.name(this.what);
+  }
+
+  name(what) {
+    this.what = what;
+    say(this.button, this.sure ? `${what}: sure?` : what);
+  }
+}
+
 export class Known {
   constructor(parts, ask) {
     this.parts = parts;
@@ -42,38 +67,22 @@ export class Known {
         return { value, sigma };
       });
     });
-    parts.anew.addEventListener("click", () => {
-      if (!this.sure) {
-        this.wait(true);
-        this.timer = setTimeout(() => this.wait(false), SURE);
-        return;
-      }
-      clearTimeout(this.timer);
-      this.wait(false);
-      ask();
-    });
-  }
-
-  // One click is easily made, and every reader of this sensor sees the attitude jump.
-  wait(sure) {
-    this.sure = sure;
-    this.parts.anew.setAttribute("aria-pressed", String(sure));
-    this.name();
-  }
-
-  name() {
-    const what = this.attitude?.aided ? "Level here" : "Zero here";
-    say(this.parts.anew, this.sure ? `${what}: sure?` : what);
+    this.level = new Twice(parts.anew, () => ask(this.attitude?.aided ? { init: "gravity" } : {}));
+    this.yaw = new Twice(parts.yawZero, () => ask({ heading: 0 }));
+    this.yaw.name("Yaw zero");
   }
 
   // A source as STATUS tells of it.
   tell(source) {
     const { parts } = this;
     // Of a recording there is nothing to begin anew.
-    parts.anew.hidden = source.resets === undefined;
+    const isLive = source.resets !== undefined;
+    parts.anew.hidden = !isLive;
     const { attitude, aid } = source;
     this.attitude = attitude ?? null;
-    this.name();
+    this.level.name(attitude?.aided ? "Level here" : "Zero here");
+    // By a field, the heading is the field's.
+    parts.yawZero.hidden = !isLive || attitude?.aided !== "gravity";
     parts.known.hidden = !attitude || !aid;
     if (parts.known.hidden) return;
     const { sigma_deg: sigma = {}, field } = attitude;

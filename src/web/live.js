@@ -51,7 +51,7 @@ cards = new Cards({ parts, view, clocks, only }, {
     watch();
     touch();
   },
-  anew: (id) => link?.send({ class: "RESET", id }),
+  anew: (id, where) => link?.send({ class: "RESET", id, ...where }),
   save: (card, kind) => save(card, kind, colours, notice),
 });
 const together = new Together(parts.together, touch);

@@ -54,6 +54,7 @@ mod surroundings;
 mod tests;
 mod update;
 mod vertical;
+mod world;
 
 pub use aided::{AidedPropagator, Start};
 pub(crate) use beside::VectorPairing;

@@ -103,6 +103,19 @@ fn the_page_shows_what_is_known_and_begins_a_sensor_anew_at_the_second_click() {
             "the page has it",
             "document.querySelector('[data-testid=flags]').textContent === 'reset'",
         );
+        const YAW: &str = "document.querySelector('[data-testid=yaw-zero]')";
+        assert_eq!(browser.eval(&format!("{YAW}.hidden")), false);
+        browser.eval(&format!("({YAW}.click(), {YAW}.click())"));
+        eventually("it is asked", || {
+            daemon.status()["sources"][0]["resets"] == 2
+        });
+        sender.send(&line(2001));
+        let att = watcher.next_of("ATT");
+        assert_eq!(att["reset"], 2, "{att}");
+        assert_eq!(
+            daemon.status()["sources"][0]["initial"],
+            "heading alone (RESET)"
+        );
         browser.is_unharmed();
     }
 }
@@ -170,6 +183,11 @@ fn of_a_gyro_alone_nothing_more_is_shown_and_zero_is_where_it_is() {
     browser.until_open();
     browser.until("the button", &format!("{BUTTON} && !{BUTTON}.hidden"));
     assert_eq!(browser.eval(&format!("{BUTTON}.textContent")), "Zero here");
+    // It has no vertical to turn about.
+    assert_eq!(
+        browser.eval("document.querySelector('[data-testid=yaw-zero]').hidden"),
+        true
+    );
     assert_eq!(
         browser.eval("document.querySelector('[data-testid=known]').hidden"),
         true

@@ -89,7 +89,7 @@ fn after_a_reset_a_gyro_alone_is_one_that_begins_with_that_attitude() {
 }
 
 #[test]
-fn after_a_reset_an_aided_attitude_is_level_at_once_and_what_was_learned_is_kept() {
+fn levelled_anew_an_aided_attitude_is_level_at_once_and_what_was_learned_is_kept() {
     let mut daemon = Fed::of(&aided());
     // Its heading has become 90 degrees, which nothing but a reset takes away.
     let first = std::iter::once(line(0)).chain([with("rpy=17.2,0,90")]);
@@ -97,7 +97,7 @@ fn after_a_reset_an_aided_attitude_is_level_at_once_and_what_was_learned_is_kept
     let heading = yaw(before.attitudes.last().unwrap());
     assert!((heading - 90.0).abs() < 1.0, "{heading}");
     let learned = source(&daemon)["aid"].clone();
-    let after = daemon.lines(std::iter::once(RESET.to_owned()).chain((2000..2020).map(line)));
+    let after = daemon.lines(std::iter::once(with("gravity")).chain((2000..2020).map(line)));
     let first = read(&after.attitudes[0]);
     assert_eq!((&first["reset"], is_reset(&first)), (&json!(2), true));
     let truth = |n: u64| (0.3 + 0.2 * (0.9 * n as f64 * 0.01).sin()).to_degrees();
@@ -122,6 +122,111 @@ fn after_a_reset_an_aided_attitude_is_level_at_once_and_what_was_learned_is_kept
     }
     let bias = learned["learned"]["gyro_bias_rad_s"][0].as_f64().unwrap();
     assert!((bias.to_degrees() - 0.5).abs() < 0.1, "{bias}");
+}
+
+/// The same body, after three seconds shaken along its y by up to 4 m/s^2: one specific force levels it 20 degrees wrong.
+fn shaken(n: u64) -> String {
+    let mut sample = read(&line(n));
+    let shakes = if n < 300 { 0.0 } else { 4.0 };
+    let y = sample["accel"][1].as_f64().unwrap() + shakes * (9.0 * n as f64 * 0.01).cos();
+    sample["accel"][1] = y.into();
+    sample.to_string()
+}
+
+/// A `RESET` to a heading, degrees.
+fn to(heading: &str) -> String {
+    format!("{{\"class\":\"RESET\",\"id\":\"imu0\",\"heading\":{heading}}}")
+}
+
+#[test]
+fn a_reset_turns_the_heading_of_a_moving_body_and_leaves_its_tilt_as_it_is() {
+    let truth = |n: u64| (0.3 + 0.2 * (0.9 * n as f64 * 0.01).sin()).to_degrees();
+    // Where one specific force would level it worst.
+    let at = 2030;
+    let without = {
+        let mut daemon = Fed::of(&aided());
+        daemon.lines((0..at + 100).map(shaken)).attitudes
+    };
+    for (asked, heading) in [
+        (RESET.to_owned(), 0.0),
+        (to("-120.5"), -120.5),
+        (to("180"), 180.0),
+    ] {
+        let mut daemon = Fed::of(&aided());
+        let before = daemon.lines((0..at).map(shaken));
+        let known = source(&daemon)["aid"]["learned"].clone();
+        let after = daemon.lines(std::iter::once(asked).chain((at..at + 100).map(shaken)));
+        assert_eq!(before.attitudes, without[..at as usize]);
+        assert_eq!(after.codes("ERROR"), [] as [&str; 0]);
+        assert_eq!(source(&daemon)["resets"], 1);
+        for (n, (got, other)) in after
+            .attitudes
+            .iter()
+            .zip(&without[at as usize..])
+            .enumerate()
+        {
+            // Roll is about an axis of the body: the tilt of the one that was left alone.
+            assert!((roll(got) - roll(other)).abs() < 1e-9, "{n}: {got} {other}");
+            assert!((roll(got) - truth(at + n as u64)).abs() < 2.0, "{n}: {got}");
+            let (got, other) = (read(got), read(other));
+            assert_eq!(
+                (&got["reset"], is_reset(&got)),
+                (&json!(1), n == 0),
+                "{got}"
+            );
+            for axis in 0..2 {
+                let of = |one: &Value| one["sigma_deg"][axis].as_f64().unwrap();
+                assert!(of(&got) <= 1.001 * of(&other), "{n}: {got} {other}");
+            }
+        }
+        let off = (yaw(&after.attitudes[0]) - heading).rem_euclid(360.0);
+        assert!(off.min(360.0 - off) < 1e-6, "{off}");
+        assert_ne!(known, Value::Null);
+    }
+    // By the next force, as it is asked for, it is not level.
+    let mut daemon = Fed::of(&aided());
+    daemon.lines((0..at).map(shaken));
+    let after = daemon.lines(std::iter::once(with("gravity")).chain((at..at + 1).map(shaken)));
+    let off = roll(&after.attitudes[0]) - truth(at);
+    assert!(off.abs() > 5.0, "{off}");
+}
+
+#[test]
+fn a_heading_is_refused_where_there_is_no_vertical_or_no_number() {
+    let mut daemon = Fed::of(&EstimationSettings::default());
+    let asked = [to("90")];
+    let got = daemon.lines(
+        (0..100)
+            .map(turning)
+            .chain(asked)
+            .chain((100..101).map(turning)),
+    );
+    assert_eq!(got.codes("ERROR"), ["bad_reset"], "{:?}", got.said);
+    let mut daemon = Fed::of(&aided());
+    daemon.lines((0..100).map(line));
+    let both = "{\"class\":\"RESET\",\"id\":\"imu0\",\"heading\":1,\"init\":\"gravity\"}";
+    let asked = [to("1e999"), to("\"north\""), to("[0]"), both.to_owned()];
+    let got = daemon.lines(asked.into_iter().chain((100..200).map(line)));
+    assert_eq!(got.codes("ERROR"), ["bad_reset"; 4], "{:?}", got.said);
+    assert_eq!(read(got.attitudes.last().unwrap())["reset"], 0);
+}
+
+#[test]
+fn a_heading_that_was_set_is_saved_and_goes_on_to_the_bit() {
+    let asked = [to("40")];
+    let mut daemon = Fed::of(&aided());
+    daemon.lines((0..300).map(line));
+    let whole = daemon.lines(asked.iter().cloned().chain((300..700).map(line)));
+    let mut daemon = Fed::of(&aided());
+    daemon.lines((0..300).map(line));
+    let mut parts = daemon.lines(asked.into_iter().chain((300..450).map(line)));
+    let mut daemon = daemon.restarted(&aided());
+    parts
+        .attitudes
+        .extend(daemon.lines((450..700).map(line)).attitudes);
+    assert_eq!(parts.attitudes.len(), 400);
+    assert!((yaw(&parts.attitudes[399]) - 40.0).abs() < 1.0);
+    assert!(parts.attitudes == whole.attitudes);
 }
 
 #[test]

@@ -4,10 +4,11 @@ use super::beside::VectorPairing;
 use super::calibration::CorrectionMatrices;
 use super::filter::{Filter, Innovation, Measured};
 use super::settings::Settings;
+use super::world::World;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
 use crate::quaternion::{BodyRate, Quaternion};
-use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
+use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
 use nalgebra::Matrix3;
 use std::collections::VecDeque;
 
@@ -72,6 +73,8 @@ pub struct AidedPropagator {
     /// Knowledge of the attitude at the beginning, and of where the next reset leads.
     begins: Start,
     anew: Option<Start>,
+    /// The next sample has this heading, rad: what was asked of it.
+    heading: Option<f64>,
     /// The attitude is not that of this stream's beginning, but one that was saved.
     pub(super) is_resumed: bool,
     pub(super) stream: StreamState,
@@ -94,6 +97,8 @@ pub(super) struct StreamState {
     /// Specific forces that do not come with the gyro samples.
     pub(super) forces: Option<VectorPairing>,
     pub(super) fields: VectorPairing,
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) world: World,
 }
 
 /// A sample and what it was corrected by.
@@ -104,6 +109,9 @@ pub(super) struct Given {
     measured: Measured,
     applied: CorrectionMatrices,
     join: Join,
+    /// Heading that was asked of it, rad.
+    #[cfg_attr(feature = "serde", serde(default))]
+    heading: Option<f64>,
 }
 
 impl AidedPropagator {
@@ -129,6 +137,7 @@ impl AidedPropagator {
             start,
             begins: start,
             anew: None,
+            heading: None,
             is_resumed: false,
             stream: StreamState {
                 given: VecDeque::new(),
@@ -136,6 +145,7 @@ impl AidedPropagator {
                 last_out: None,
                 forces: None,
                 fields: VectorPairing::with_repeats(),
+                world: World::default(),
             },
             corrected: Vec::new(),
             scratch: Vec::new(),
@@ -210,12 +220,14 @@ impl AidedPropagator {
     /// As there.
     pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), SettingsError> {
         self.propagator.resume(last)?;
+        self.stream.world = World::default();
         self.is_resumed = true;
         Ok(())
     }
 
     /// See [`Propagator::continue_counts_of`].
     pub fn continue_counts_of(&mut self, resets: u32) {
+        self.stream.world = World::default();
         self.propagator.continue_counts_of(resets);
     }
 
@@ -224,6 +236,14 @@ impl AidedPropagator {
     pub fn begin_anew(&mut self, attitude: &Quaternion<Nav, Body>, start: Start) {
         self.propagator.begin_anew(attitude);
         self.anew = Some(start);
+        self.heading = None;
+    }
+
+    /// Turns the world about the vertical, so that the next sample has this heading (rad, in (-pi, pi]), and says
+    /// [`Status::RESET`]; tilt and what was learned of the sensor stay as they are. Where a magnetic field tells the
+    /// heading, that is found anew by the field, whatever `heading` is.
+    pub fn turn_heading(&mut self, heading: f64) {
+        self.heading = Some(heading);
     }
 
     /// Takes samples in and appends the attitudes that are ready.
@@ -308,6 +328,7 @@ impl AidedPropagator {
             },
             applied,
             join: sample.join,
+            heading: self.heading.take(),
         });
         RateSample {
             gyro: sample
@@ -337,27 +358,41 @@ impl AidedPropagator {
                 .front()
                 .is_some_and(|given| given.stamp == sample.stamp);
             let (mut q_nb, mut r) = self.filter.corrected(&sample.q_nb);
-            if is_first
-                && let Some(given) = self.stream.given.pop_front()
-                && self.take(&given, sample, &r)
-            {
-                (q_nb, r) = self.filter.corrected(&sample.q_nb);
+            let mut status = sample.status;
+            if is_first && let Some(given) = self.stream.given.pop_front() {
+                if self.take(&given, sample, &r) {
+                    (q_nb, r) = self.filter.corrected(&sample.q_nb);
+                }
+                if let Some(heading) = given.heading {
+                    self.set_heading(sample.stamp, &q_nb, heading);
+                    status = status.with(Status::RESET);
+                }
             }
-            let status = sample.status.with(self.filter.status());
-            if let Some(last) = self.stream.last_out {
-                q_nb = q_nb.same_sign_as(&Quaternion::assume_unit(last));
-            }
-            let corrected = AttitudeSample {
+            let mut told = self.stream.world.told(AttitudeSample {
                 q_nb,
-                status,
+                status: status.with(self.filter.status()),
                 covariance: self.filter.attitude_covariance(&r, &sample.rate.0),
                 ..*sample
-            };
-            self.stream.last_out = Some(q_nb.wxyz());
-            out.push(corrected);
+            });
+            if let Some(last) = self.stream.last_out {
+                told.q_nb = told.q_nb.same_sign_as(&Quaternion::assume_unit(last));
+            }
+            self.stream.last_out = Some(told.q_nb.wxyz());
+            out.push(told);
         }
         scratch.clear();
         self.scratch = scratch;
+    }
+
+    /// The attitude at `stamp` is asked to have this heading.
+    fn set_heading(&mut self, stamp: Nanos, attitude: &Quaternion<Nav, Body>, heading: f64) {
+        let has_field = self.filter.has_field();
+        let heading = match has_field {
+            true => attitude.yaw_pitch_roll().yaw,
+            false => heading,
+        };
+        self.stream.world.set_heading(stamp, attitude, heading);
+        self.filter.restart_heading();
     }
 
     /// Takes what was measured at an attitude, which with the correction so far has the matrix `r`. Whether that is
@@ -365,6 +400,7 @@ impl AidedPropagator {
     fn take(&mut self, given: &Given, propagated: &AttitudeSample, r: &Matrix3<f64>) -> bool {
         let (measured, attitude) = (&given.measured, &propagated.q_nb);
         if given.join == Join::Reset {
+            self.stream.world.begin_anew();
             match self.anew.take() {
                 // Asked for: nothing has happened to the sensor.
                 Some(start) => {

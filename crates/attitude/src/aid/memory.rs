@@ -100,6 +100,7 @@ impl Memory {
             && stream.given.len() <= MOST_GIVEN
             && filter.rest.is_bounded()
             && filter.vertical.is_plausible()
+            && stream.world.is_plausible()
             && beside.all(VectorPairing::is_bounded)
     }
 }

@@ -89,6 +89,22 @@ impl Filter {
         self.state.rest.interrupt();
     }
 
+    /// Begins the heading anew, and leaves the tilt and the calibration: where no field tells it, it is what the world
+    /// is turned by; else the next field tells it.
+    pub(super) fn restart_heading(&mut self) {
+        let heading = match self.settings.has_field {
+            true => HEADING_UNKNOWN,
+            false => 0.0,
+        };
+        self.state.covariance.restart(HEADING, heading * heading);
+        if self.settings.has_field {
+            let sigma = self.settings.field_sigma;
+            self.state.covariance.restart(FIELD, sigma * sigma);
+            self.state.disturbance = 0.0;
+            self.state.surroundings = Surroundings::default();
+        }
+    }
+
     /// Resets, and keeps the calibration, known a little less.
     pub(crate) fn reset(&mut self) {
         self.begin_anew();

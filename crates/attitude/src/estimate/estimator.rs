@@ -307,6 +307,15 @@ impl Estimator {
         self.begins_anew = true;
     }
 
+    /// Turns the world so that the next sample has this heading (rad), and says [`Status::RESET`]: see
+    /// [`AidedPropagator::turn_heading`]. `false`, and nothing changes, of a gyro alone: it has no vertical.
+    ///
+    /// [`Status::RESET`]: crate::record::Status::RESET
+    /// [`AidedPropagator::turn_heading`]: crate::aid::AidedPropagator::turn_heading
+    pub fn turn_heading(&mut self, heading: f64) -> bool {
+        self.integrator.turn_heading(heading)
+    }
+
     /// See [`Conditioner::stamp_of`].
     #[must_use]
     pub fn stamp_of(&self, raw: &RawSample, near: Nanos) -> Option<Nanos> {

@@ -151,6 +151,15 @@ impl Integrator {
         }
     }
 
+    /// Returns whether there is a vertical to turn the world about.
+    pub(super) fn turn_heading(&mut self, heading: f64) -> bool {
+        let Integrator::Aided(aided) = self else {
+            return false;
+        };
+        aided.turn_heading(heading);
+        true
+    }
+
     pub(super) fn keep_innovations(&mut self) {
         if let Integrator::Aided(aided) = self {
             aided.keep_innovations();

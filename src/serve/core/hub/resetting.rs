@@ -77,7 +77,7 @@ impl Hub {
         let plan = self.sensors.plan_of(asked.sensor());
         sensor
             .stream
-            .reset(plan, asked.initial)
+            .reset(plan, asked.beginning)
             .map_err(|why| fault("bad_reset", &why))
     }
 }

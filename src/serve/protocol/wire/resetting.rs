@@ -16,14 +16,26 @@ const MAX_INIT: usize = 256;
 pub struct Reset {
     /// Id of the sensor; `None` = the one without a name.
     pub id: Option<String>,
-    /// Attitude at which it begins; `None` = as the daemon's `--init` states.
-    pub initial: Option<Initial>,
+    /// Beginning of the attitude.
+    pub beginning: Beginning,
+}
+
+/// Beginning that is asked for.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Beginning {
+    /// Attitude of the daemon's `--init`; where that is none, heading 0.
+    Unsaid,
+    /// An attitude.
+    At(Initial),
+    /// The heading of this attitude, which is level; the tilt stays as it is.
+    Heading(Initial),
 }
 
 #[derive(Deserialize)]
 struct ResetObject {
     id: Option<String>,
     init: Option<String>,
+    heading: Option<f64>,
 }
 
 impl Reset {
@@ -47,25 +59,33 @@ pub(super) fn read(text: &[u8]) -> Result<Reset, Fault> {
         id: id.clone(),
         ..Fault::new("bad_reset", what)
     };
-    let initial = match asked.init.as_deref() {
-        None => None,
-        Some(long) if long.len() > MAX_INIT => {
-            return Err(bad(format!(
-                "`init` has {} bytes; at most {MAX_INIT} can mean something",
-                long.len()
-            )));
+    let beginning = beginning(asked.init.as_deref(), asked.heading).map_err(bad)?;
+    Ok(Reset { id, beginning })
+}
+
+/// Reads where it is to begin.
+fn beginning(init: Option<&str>, heading: Option<f64>) -> Result<Beginning, String> {
+    match (init, heading) {
+        (None, None) => Ok(Beginning::Unsaid),
+        (Some(_), Some(_)) => {
+            Err("`init` and `heading`: a heading leaves the tilt as it is, an init does not; one of them".to_owned())
         }
-        Some(init) => match parse_initial(init) {
-            Ok(Initial::FirstOrientation) => {
-                return Err(bad(
-                    "`init`: there is no first orientation in the middle of a run; identity, gravity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned(),
-                ));
-            }
-            Ok(initial) => Some(initial),
-            Err(why) => return Err(bad(format!("`init`: {}", printable(&why.to_string())))),
+        (None, Some(heading)) => match parse_initial(&format!("rpy=0,0,{heading}")) {
+            Ok(level) => Ok(Beginning::Heading(level)),
+            Err(why) => Err(format!("`heading`: {}", printable(&why.to_string()))),
         },
-    };
-    Ok(Reset { id, initial })
+        (Some(long), None) if long.len() > MAX_INIT => Err(format!(
+            "`init` has {} bytes; at most {MAX_INIT} can mean something",
+            long.len()
+        )),
+        (Some(init), None) => match parse_initial(init) {
+            Ok(Initial::FirstOrientation) => Err(
+                "`init`: there is no first orientation in the middle of a run; identity, gravity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned(),
+            ),
+            Ok(initial) => Ok(Beginning::At(initial)),
+            Err(why) => Err(format!("`init`: {}", printable(&why.to_string()))),
+        },
+    }
 }
 
 /// The answer: it is taken, and holds from the sensor's next sample on.
