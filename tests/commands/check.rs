@@ -2,6 +2,7 @@
 
 mod advice;
 mod faults;
+mod forces_elsewhere;
 mod judged;
 mod many;
 mod orientation;

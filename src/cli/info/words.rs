@@ -116,11 +116,20 @@ fn write_others(info: &Overview<'_>, out: &mut String) {
         .iter()
         .filter(|k| !looked.contains(k.channel.topic.as_str()))
         .collect();
+    let forces: BTreeSet<&str> = info
+        .looked
+        .iter()
+        .flat_map(|looked| &looked.aid.forces)
+        .map(|force| force.topic.as_str())
+        .collect();
     for known in others.iter().take(OTHERS) {
         let what = match (
             known.rank(),
             known.role.has_orientation && known.messages > 0,
         ) {
+            _ if forces.contains(known.channel.topic.as_str()) => {
+                "  (carries a specific force: --accel-topic takes it)"
+            }
             (1.., _) => "  (carries a rate: --topic takes it)",
             (_, true) => "  (carries an orientation: compare takes it)",
             _ => "",

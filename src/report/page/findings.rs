@@ -52,6 +52,7 @@ fn answered(code: &str, plan: &EstimationSettings) -> Option<&'static str> {
     let (is_given, flag) = match code {
         "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
         "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
+        "looks-frd" if plan.is_accel_kinematic => (true, "--accel-sign"),
         "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),
         "mounted-on-side" => (plan.mount.is_some(), "--mount"),
         "bias" => (!matches!(plan.bias, Bias::Unsaid | Bias::None), "--bias"),

@@ -20,7 +20,11 @@ use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, EstimationSettings};
-use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
+use strapd_attitude::setting::{ACCEL_TOPIC, AID, FIELD, MAG_TOPIC, TIME};
+
+/// Lengths of a first force, m/s^2, by which a vector that only its topic names is no other acceleration: gravity,
+/// and half of it for a body that does not begin at rest.
+const GRAVITY: std::ops::Range<f64> = 5.0..15.0;
 
 /// Channels that are read beside those of the samples.
 #[derive(Debug, Default)]
@@ -72,7 +76,18 @@ pub fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
     }
 }
 
-/// Chooses. `own` is the topic of the samples, and whether its messages carry a field themselves.
+/// Messages of the samples themselves: what they carry needs no topic beside them.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnMessages<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// Whether they carry a specific force.
+    pub has_force: bool,
+    /// Whether they carry a magnetic field.
+    pub has_field: bool,
+}
+
+/// Chooses what is read beside the samples of `own`; forces that nobody named are noted, not taken.
 ///
 /// # Errors
 /// A topic that is not there, or carries nothing of the kind; several that may be meant.
@@ -80,16 +95,18 @@ pub fn choose(
     (plan, selection): (&EstimationSettings, &Selection),
     path: &Path,
     log: &Recording,
-    (own, has_field): (&str, bool),
+    own: OwnMessages<'_>,
 ) -> Result<AuxiliaryInputs> {
     let mut besides = AuxiliaryInputs::default();
     if let Some(beside) = &selection.accel {
         besides.add(named(plan, Wanted::Forces, beside, path, log)?);
+    } else if plan.aid == Aid::Auto && !own.has_force {
+        besides.notes.extend(forces_not_taken(plan, log, own.topic));
     }
     if let Some(beside) = &selection.mag {
         besides.add(named(plan, Wanted::Fields, beside, path, log)?);
-    } else if plan.aid == Aid::GravityAndField && !has_field {
-        let found = unnamed(plan, path, log, own)?;
+    } else if plan.aid == Aid::GravityAndField && !own.has_field {
+        let found = unnamed(plan, path, log, own.topic)?;
         besides.notes.push(format!(
             "the magnetic field was taken from {} ({MAG_TOPIC} NAME takes another)",
             printable(&found.0.channel.topic)
@@ -155,6 +172,20 @@ impl<'l> Vectors<'l> {
     }
 }
 
+/// Note on the specific forces that the log has for samples without any.
+fn forces_not_taken(plan: &EstimationSettings, log: &Recording, own: &str) -> Option<String> {
+    let forces = readable(plan, log, Wanted::Forces);
+    let listed = listed(log, Wanted::Forces, &forces);
+    let others = listed.iter().map(|found| found.topic.as_str());
+    let names: Vec<&str> = others.filter(|topic| *topic != own).collect();
+    let first = names.first()?;
+    Some(format!(
+        "the samples carry no specific force, so the gyro alone gives the attitude; forces are on {} ({AID} gravity {ACCEL_TOPIC} {} takes them)",
+        named_few(&names),
+        printable(first)
+    ))
+}
+
 /// The channels with vectors of this kind, with their decoders.
 fn readable<'l>(
     plan: &EstimationSettings,
@@ -164,12 +195,14 @@ fn readable<'l>(
     let mut decoders = Decoders::of_run(plan, &options(wanted, None));
     let channels = log.channels.iter();
     channels
-        .filter(|known| known.messages > 0 && may_be_field(&known.channel))
+        .filter(|known| known.messages > 0)
+        .filter(|known| may_be_field(&known.channel) || is_force_by_name(wanted, known))
         .filter_map(|known| Some((known, known.decoder(&mut decoders).ok()?)))
         .collect()
 }
 
-/// The topics of channels without a rate: with one, they are samples of their own.
+/// The topics of channels without a rate: with one, they are samples of their own. A vector that only its topic names
+/// is a force if it begins as long as gravity.
 fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicOfVectors> {
     let secs = log
         .survey
@@ -177,10 +210,11 @@ fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicO
         .map(|(a, b)| b.saturating_sub(a) as f64 * 1e-9);
     let listed = found.iter().filter(|(known, decoder)| {
         let stated = decoder.stated();
-        !stated.has_gyro && !known.role.has_rate && stated.has_stamp
+        let is_rate = known.role.has_rate && !is_force_by_name(wanted, known);
+        !stated.has_gyro && !is_rate && stated.has_stamp
     });
     listed
-        .map(|(known, decoder)| {
+        .filter_map(|(known, decoder)| {
             let mut samples = Vec::new();
             if let Some((at, payload)) = &known.first {
                 let _ = decoder.decode(payload, *at, *at, &mut samples);
@@ -189,14 +223,17 @@ fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicO
                 Wanted::Fields => raw.mag,
                 _ => raw.accel,
             });
-            TopicOfVectors {
+            let first = vector.map(|[x, y, z]| x.hypot(y).hypot(z));
+            let is_gravity = first.is_some_and(|length| GRAVITY.contains(&length));
+            let is_one = may_be_field(&known.channel) || is_gravity;
+            is_one.then(|| TopicOfVectors {
                 topic: known.channel.topic.clone(),
                 described: described(&known.channel).to_string(),
                 rate_hz: secs
                     .filter(|secs| *secs > 0.0)
                     .map(|secs| known.messages.saturating_sub(1) as f64 / secs),
-                first: vector.map(|[x, y, z]| x.hypot(y).hypot(z)),
-            }
+                first,
+            })
         })
         .collect()
 }
@@ -285,4 +322,15 @@ fn one_beside<'f, 'l>(
 pub fn may_be_field(channel: &Channel) -> bool {
     let schema = channel.schema.as_deref().map_or("", |s| &s.name);
     !schema.ends_with("Vector3Stamped")
+}
+
+/// Whether specific forces are wanted, and the topic of a vector says that it is one: `/imu/acceleration`, and not an
+/// angular one.
+fn is_force_by_name(wanted: Wanted, known: &LogChannel) -> bool {
+    let topic = known.channel.topic.to_ascii_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| topic.contains(word));
+    wanted == Wanted::Forces
+        && !may_be_field(&known.channel)
+        && has(&["acc", "specific_force"])
+        && !has(&["ang", "gyro", "bias", "cmd", "target", "setpoint"])
 }

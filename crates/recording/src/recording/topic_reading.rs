@@ -2,7 +2,7 @@
 //!
 //! Apart from the replay for who looks at samples and integrates none: which topic, by which decoders, and the walk.
 
-use super::beside::{self, AuxiliaryInputs};
+use super::beside::{self, AuxiliaryInputs, OwnMessages};
 use super::channel_route::{Item, PayloadNotes, Route, RouteTarget};
 use super::decoders::Decoders;
 use super::log_channel::LogChannel;
@@ -107,7 +107,11 @@ impl<'l> TopicReading<'l> {
         if selection.mag.is_none() {
             self = self.with_fields();
         }
-        let own = (self.plan.source.topic.as_str(), true);
+        let own = OwnMessages {
+            topic: &self.plan.source.topic,
+            has_force: true,
+            has_field: true,
+        };
         let asked = (&EstimationSettings::default(), selection);
         let named = beside::choose(asked, self.log.name(), self.log, own)?;
         self.besides.append(named);

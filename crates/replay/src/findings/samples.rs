@@ -44,7 +44,7 @@ struct Seen<'a> {
 type Rule = fn(&Seen<'_>, &mut Vec<Finding>);
 
 /// The rules, in the order of what they find.
-const RULES: [Rule; 17] = [
+const RULES: [Rule; 18] = [
     rows,
     clock,
     stamps::clocks,
@@ -52,6 +52,7 @@ const RULES: [Rule; 17] = [
     gravity::turns_otherwise,
     stamps::stand_still,
     never_still,
+    gravity::elsewhere,
     gravity::unit,
     gravity::mounting,
     clipped_or_stuck,

@@ -16,7 +16,7 @@ use strapd_attitude::setting::{FIELD, TOPIC};
 use strapd_recording::Recording;
 use strapd_recording::decode::Decoder;
 use strapd_recording::mcap::Channel;
-use strapd_recording::recording::beside::{self, AuxiliaryInputs};
+use strapd_recording::recording::beside::{self, AuxiliaryInputs, OwnMessages};
 use strapd_recording::recording::channel_route::{PayloadNotes, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, rank};
@@ -123,8 +123,17 @@ pub(super) fn besides(
         }
         return Ok(AuxiliaryInputs::default());
     };
-    let has_field = one.plan.channels.iter().any(|(_, d)| d.stated().has_mag);
-    let own = (one.plan.source.topic.as_str(), has_field);
+    let stated = || {
+        one.plan
+            .channels
+            .iter()
+            .map(|(_, decoder)| decoder.stated())
+    };
+    let own = OwnMessages {
+        topic: &one.plan.source.topic,
+        has_force: stated().any(|stated| stated.has_accel),
+        has_field: stated().any(|stated| stated.has_mag),
+    };
     let mut besides = beside::choose((&run.plan, &run.selection), path, log, own)?;
     one.found
         .warnings

@@ -3,10 +3,12 @@
 use super::{Finding, Seen, Severity};
 use crate::inspection::Inspection;
 use nalgebra::{Vector3, Vector4};
+use serde_json::json;
 use strapd_attitude::condition::quality::GravityAxis;
 use strapd_attitude::frames::BodyAxes;
-use strapd_attitude::setting::{BODY, COLUMNS, GYRO_UNIT, MOUNT};
+use strapd_attitude::setting::{ACCEL_SIGN, ACCEL_TOPIC, AID, BODY, COLUMNS, GYRO_UNIT, MOUNT};
 use strapd_recording::format::Format;
+use strapd_recording::text::{named_few, printable};
 
 /// Below this correlation the accelerometer reads too much besides gravity.
 const MIN_CORRELATION: f64 = 0.7;
@@ -67,6 +69,28 @@ pub(super) fn turns_otherwise(seen: &Seen<'_>, out: &mut Vec<Finding>) {
             .help([BODY.to("MAP")])
             .help([GYRO_UNIT.to("deg")]),
     });
+}
+
+/// Absence of forces in the samples, and the topics that carry them.
+pub(super) fn elsewhere(seen: &Seen<'_>, out: &mut Vec<Finding>) {
+    let aid = &seen.looked.aid;
+    let Some(first) = aid.forces.first().filter(|_| !aid.has_force) else {
+        return;
+    };
+    let names: Vec<&str> = aid.forces.iter().map(|one| one.topic.as_str()).collect();
+    out.push(
+        Finding::new(
+            Severity::Note,
+            "force-on-another-topic",
+            format!(
+                "the samples carry no specific force, so the gyro alone gives the attitude; forces are on {}",
+                named_few(&names)
+            ),
+        )
+        .with("topics", json!(names))
+        .advise("gravity then corrects the tilt")
+        .help([AID.to("gravity"), ACCEL_TOPIC.to(printable(&first.topic))]),
+    );
 }
 
 /// Accelerations in g: at rest, or as most of them are long where nothing rests.
@@ -136,8 +160,9 @@ pub(super) fn mounting(seen: &Seen<'_>, out: &mut Vec<Finding>) {
                     "gravity reads negative on z at rest: z points down",
                 )
                 .with("stated", stated.to_string())
-                .advise("the body looks like front, right, down")
+                .advise("the body is front, right, down; or its accelerometer says down where it should say up: the gyro agrees with both, and the wrong one mirrors pitch and yaw")
                 .help([BODY.to("frd")])
+                .help([ACCEL_SIGN.to("kinematic")])
             })
         }
         Some(gravity) => Some(
