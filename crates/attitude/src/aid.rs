@@ -9,6 +9,7 @@
 //! attitude, rate, force, field -> sums over 0.1 s               interval
 //! sums -> covariance a step on                                  covariance
 //! force less gravity -> tilt, calibration                       gravity
+//! corrections of the bias -> how far it drifts                  drift
 //! the vertical in the body -> what gravity can say of a bias    vertical
 //! rate at rest -> bias                                          rest
 //! heading of the field -> heading                               heading
@@ -36,6 +37,7 @@ mod aided;
 mod beside;
 mod calibration;
 mod covariance;
+mod drift;
 mod evidence;
 mod filter;
 mod gravity;

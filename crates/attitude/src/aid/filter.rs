@@ -247,6 +247,15 @@ impl Filter {
         withheld > 0.5 && self.variance_of_bias(main) > 0.25 * self.prior_of_bias(main)
     }
 
+    /// Gyro's bias when it was first known to 0.1 deg/s, rad/s, where that of now is clearly another: it drifts.
+    #[must_use]
+    pub fn bias_moved_from(&self) -> Option<Vector3<f64>> {
+        let sigma = self.calibration_sigma().bias;
+        self.state
+            .drift
+            .moved_from(&self.state.calibration.bias, &sigma)
+    }
+
     /// Variance of the gyro's bias along a unit vector of the body, (rad/s)^2.
     pub(super) fn variance_of_bias(&self, axis: &Vector3<f64>) -> f64 {
         let bias = Matrix3::from_fn(|i, j| self.state.covariance.between(BIAS + i, BIAS + j));

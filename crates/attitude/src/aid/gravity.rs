@@ -60,7 +60,7 @@ impl Filter {
         let mut variance =
             self.state
                 .residuals
-                .variance(secs, residual, force.acceleration.z, &settings);
+                .variance(secs, residual, &force.acceleration, &settings);
         if self.rests() {
             let (ax, ay) = (force.acceleration.x, force.acceleration.y);
             let square = ax * ax + ay * ay;

@@ -101,6 +101,7 @@ impl Memory {
             && filter.rest.is_bounded()
             && filter.vertical.is_plausible()
             && stream.world.is_plausible()
+            && filter.drift.is_plausible()
             && beside.all(VectorPairing::is_bounded)
     }
 }
@@ -110,9 +111,9 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::aid::covariance::Covariance;
-    #[cfg(feature = "serde")]
-    use crate::aid::vertical::Vertical;
     use crate::aid::{Settings, Start};
+    #[cfg(feature = "serde")]
+    use crate::aid::{drift::Drift, vertical::Vertical};
     use crate::frames::In;
     use crate::propagate::{Method, Order};
     use crate::quaternion::{BodyRate, Quaternion};
@@ -211,8 +212,10 @@ mod tests {
         } else {
             0
         };
-        // Four hundred are those of the vertical, fourteen numbers, two hundred those of a rest that may be a turn, seven.
-        let most = 8192 + 400 + 200 + iron + 700 * memory.stream.given.len().saturating_sub(1);
+        // Four hundred are those of the vertical, fourteen numbers, two hundred those of a rest that may be a turn, seven,
+        // three hundred those of a drift, twelve.
+        let most =
+            8192 + 400 + 200 + 300 + iron + 700 * memory.stream.given.len().saturating_sub(1);
         assert!(
             text.len() < most,
             "{} {}",
@@ -234,11 +237,14 @@ mod tests {
         let _ = fed(&mut whole, 0..500);
         let (propagation, memory) = whole.memory().unwrap();
         let mut text = serde_json::to_value(&memory).unwrap();
-        assert!(text.as_object_mut().unwrap().remove("vertical").is_some());
+        for later in ["vertical", "drift"] {
+            assert!(text.as_object_mut().unwrap().remove(later).is_some());
+        }
         let rest = text["rest"].as_object_mut().unwrap();
         assert!(rest.remove("is_certain").is_some());
         let older: Memory = serde_json::from_value(text).unwrap();
         assert_eq!(older.filter.vertical, Vertical::default());
+        assert_eq!(older.filter.drift, Drift::default());
         let mut other = aided(Method::Auto);
         assert!(other.recall((&propagation, &older)));
         assert_eq!(fed(&mut other, 500..600).len(), 100);
@@ -252,7 +258,7 @@ mod tests {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..50);
         let (propagation, memory) = whole.memory().unwrap();
-        let of_filter = "calibration correction covariance disturbance fields forces gaps_in_a_row given interval \
+        let of_filter = "calibration correction covariance disturbance drift fields forces gaps_in_a_row given interval \
                          is_started is_widened last last_force last_out last_rate last_up mean_acceleration nominal \
                          plausibility position report residuals rest since_force surroundings velocity vertical \
                          wants_level";

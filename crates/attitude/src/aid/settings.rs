@@ -10,6 +10,8 @@ pub struct Settings {
     pub gyro_noise: f64,
     /// Random walk of its bias, rad/s/sqrt(s).
     pub bias_walk: f64,
+    /// Multiplies the random walk that corrections of one sign show beyond it; 0: the bias is never taken to drift.
+    pub bias_drift: f64,
     /// Sensitivity of the bias to the specific force, per 1 g along
     /// an axis, rad/s: proof masses have weight.
     pub bias_by_tilt: f64,
@@ -62,6 +64,8 @@ pub struct Settings {
     pub force_instant: f64,
     /// Share of the vertical residual.
     pub force_vertical: f64,
+    /// Largest square of a residual, as a multiple of that of the acceleration in it.
+    pub force_carried: f64,
     /// Discount of residuals that resemble the ones before them; 0: none, 1: as for a
     /// process of first order.
     pub colour: f64,
@@ -133,6 +137,7 @@ impl Default for Settings {
         Settings {
             gyro_noise: 1e-4,
             bias_walk: 1.5e-4,
+            bias_drift: 4.0,
             bias_by_tilt: 2e-4,
             rate_noise: 7e-5,
             bias_prior: 0.02,
@@ -157,6 +162,7 @@ impl Default for Settings {
             force_secs: 9.0,
             force_instant: 0.8,
             force_vertical: 0.1,
+            force_carried: 30.0,
             colour: 1.1,
             update_secs: 0.1,
             rest_secs: 1.5,

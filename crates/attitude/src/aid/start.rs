@@ -2,6 +2,7 @@
 
 use super::calibration::CorrectionMatrices;
 use super::covariance::{BIAS, FIELD, HEADING, POSITION, TILT, VELOCITY};
+use super::drift::Drift;
 use super::filter::{Filter, Measured, is_field};
 use super::interval::Interval;
 use super::residuals::Residuals;
@@ -163,5 +164,6 @@ impl Filter {
         self.derived.known = CorrectionMatrices::of(&self.state.calibration);
         self.state.is_widened = false;
         self.state.vertical = Vertical::default();
+        self.state.drift = Drift::default();
     }
 }

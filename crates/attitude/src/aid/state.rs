@@ -6,6 +6,7 @@
 
 use super::calibration::Calibration;
 use super::covariance::Covariance;
+use super::drift::Drift;
 use super::filter::Report;
 use super::interval::Interval;
 use super::plausibility::Plausibility;
@@ -39,9 +40,11 @@ pub(super) struct State {
     pub(super) mean_acceleration: Vector3<f64>,
     /// The vertical in the interval before, body axes.
     pub(super) last_up: Option<Vector3<f64>>,
-    /// Nothing seen in a file that is older than this field.
+    /// Nothing seen in a file that is older than these two fields.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(super) vertical: Vertical,
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) drift: Drift,
     pub(super) surroundings: Surroundings,
     /// Whether a gap has been too long for the tilt to be known.
     pub(super) wants_level: bool,

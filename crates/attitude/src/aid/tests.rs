@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod drift;
 mod golden;
 mod iron;
 mod planar;

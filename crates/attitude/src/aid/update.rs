@@ -32,7 +32,7 @@ impl Filter {
         self.predict(force.as_ref());
         let mut correction: Correction = [0.0; WIDTH];
         if let Some(force) = force.filter(|_| !is_levelled && !self.state.wants_level) {
-            self.use_gravity(&force, &mut correction);
+            self.use_gravity_and_watch(&force, &mut correction);
         }
         self.use_rest(&mut correction);
         if self.state.interval.fields > 0.0 {
@@ -47,6 +47,21 @@ impl Filter {
             self.forget_calibration();
             self.reset();
         }
+    }
+
+    /// The measurement of tilt, and what it makes of the bias.
+    fn use_gravity_and_watch(&mut self, force: &Force, correction: &mut Correction) {
+        let variance =
+            |filter: &Filter| Vector3::from_fn(|i, _| filter.state.covariance.variance(BIAS + i));
+        let before = variance(self);
+        self.use_gravity(force, correction);
+        let after = variance(self);
+        let by = Vector3::from_fn(|i, _| correction[BIAS + i]);
+        let secs = self.state.interval.secs;
+        self.state.drift.take(&by, &(before - after), secs);
+        let sigma = after.map(|v| v.max(0.0).sqrt());
+        let bias = self.state.calibration.bias + by;
+        self.state.drift.know(&bias, &sigma);
     }
 
     /// The measurement of the gyro's bias, where the body rests.
@@ -150,7 +165,9 @@ impl Filter {
             .map_or(0.0, |last| (up - last).norm_squared());
         self.state.last_up = Some(up);
         self.state.vertical.take(&up, secs, settings.lean_believed);
-        let bias = settings.bias_walk.powi(2) * secs + settings.bias_by_tilt.powi(2) * tilted;
+        let drift = self.state.drift.excess(settings.bias_drift);
+        let walk = (settings.bias_walk.powi(2) + drift) * secs;
+        let bias = walk + settings.bias_by_tilt.powi(2) * tilted;
         for axis in 0..3 {
             self.state.covariance.add(BIAS + axis, bias);
             self.state

@@ -128,6 +128,9 @@ impl ClassPass {
         };
         let mut conditioner = Conditioner::new(&conditioning).ok()?;
         let settings = Settings {
+            // Constants are looked for: what a class leaves unexplained must not pass for a bias that drifts.
+            bias_drift: 0.0,
+            force_carried: f64::INFINITY,
             has_field: false,
             hard_iron: 0.0,
             ..wide.settings

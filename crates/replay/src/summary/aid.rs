@@ -16,6 +16,7 @@ pub struct FilterSummary {
     is_implausible: bool,
     is_beyond_class: bool,
     is_bias_unobserved: bool,
+    moved_from: Option<Vector3<f64>>,
     is_at_rest: bool,
     report: Report,
     calibration: Calibration,
@@ -44,6 +45,7 @@ impl FilterSummary {
             is_implausible: filter.is_force_implausible(),
             is_beyond_class: filter.is_beyond_class(),
             is_bias_unobserved: filter.is_bias_unobserved(),
+            moved_from: filter.bias_moved_from(),
             is_at_rest: filter.is_at_rest(),
             report: filter.report(),
             calibration: *filter.calibration(),
@@ -121,6 +123,13 @@ impl FilterSummary {
         if self.is_bias_unobserved {
             lines.push(format!(
                 "the bias is not observed: the body turns about its vertical axis only and does not rest, so its heading drifts as the gyro's ({BIAS} x,y,z gives the bias)"
+            ));
+        }
+        if let Some(from) = &self.moved_from {
+            lines.push(format!(
+                "the bias moved on the way, from {} to {} deg/s: a gyro that warms up does so, and the filter followed it",
+                deg(from),
+                deg(&self.calibration.bias)
             ));
         }
         if self.has_iron() {
@@ -254,6 +263,7 @@ impl FilterSummary {
             "force_implausible": self.is_implausible,
             "beyond_class": self.is_beyond_class,
             "bias_unobserved": self.is_bias_unobserved,
+            "bias_moved_from_rad_s": self.moved_from.as_ref().map(list),
             "fields": self.report.fields,
             "fields_doubted": self.report.fields_rejected,
             "fields_unpaired": self.report.fields_unpaired,

@@ -17,6 +17,8 @@ pub(super) fn plain() -> Settings {
     Settings {
         bias_walk: 8e-5,
         bias_prior: 8.7e-3,
+        bias_drift: 0.0,
+        force_carried: f64::INFINITY,
         colour: 0.0,
         rest_rate: 0.0349,
         rest_beside_bias: false,
@@ -246,6 +248,8 @@ fn the_golden_case_with_coloured_residuals_comes_out_to_all_its_digits() {
             bias_by_tilt: 0.0,
             rest_by_spell: false,
             lean_believed: 0.0,
+            bias_drift: 0.0,
+            force_carried: f64::INFINITY,
             ..Settings::default()
         };
         let worst = compare("golden_colour.txt", which, settings, [0, 1, 2, 3]);

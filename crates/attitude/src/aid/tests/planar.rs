@@ -12,7 +12,7 @@ const HZ: f64 = 100.0;
 const G: f64 = 9.81;
 
 /// White noise from a seed (Numerical Recipes' generator, twelve at a time): no stream of the library's own.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
@@ -27,7 +27,7 @@ impl Noise {
         sum
     }
 
-    fn vector(&mut self) -> Vector3<f64> {
+    pub(super) fn vector(&mut self) -> Vector3<f64> {
         Vector3::from_fn(|_, _| self.next())
     }
 }
