@@ -165,15 +165,7 @@ impl Filter {
             .map_or(0.0, |last| (up - last).norm_squared());
         self.state.last_up = Some(up);
         self.state.vertical.take(&up, secs, settings.lean_believed);
-        let drift = self.state.drift.excess(settings.bias_drift);
-        let walk = (settings.bias_walk.powi(2) + drift) * secs;
-        let bias = walk + settings.bias_by_tilt.powi(2) * tilted;
-        for axis in 0..3 {
-            self.state.covariance.add(BIAS + axis, bias);
-            self.state
-                .covariance
-                .add(FORCE_BIAS + axis, settings.force_bias_walk.powi(2) * secs);
-        }
+        self.let_biases_wander(secs, tilted);
         for i in 0..2 {
             self.state
                 .covariance
@@ -186,6 +178,21 @@ impl Filter {
                 .covariance
                 .add(FIELD, settings.field_sigma.powi(2) * (1.0 - left * left));
             self.state.disturbance *= left;
+        }
+    }
+
+    /// Makes the biases of gyro and accelerometer less known after an interval of `secs` in which the vertical has
+    /// moved by the square root of `tilted` in the body.
+    fn let_biases_wander(&mut self, secs: f64, tilted: f64) {
+        let settings = &self.settings;
+        let drift = self.state.drift.excess(settings.bias_drift);
+        let walk = (settings.bias_walk.powi(2) + drift) * secs;
+        let bias = walk + settings.bias_by_tilt.powi(2) * tilted;
+        for axis in 0..3 {
+            self.state.covariance.add(BIAS + axis, bias);
+            self.state
+                .covariance
+                .add(FORCE_BIAS + axis, settings.force_bias_walk.powi(2) * secs);
         }
     }
 
