@@ -84,3 +84,57 @@ fn fast_sensors_bursts_and_doubled_rows_are_read() {
         }
     }
 }
+
+/// A table of a sensor at 100 Hz by the recorder's clock, with these stamps.
+fn recorded(at: &Path, stamp: impl Fn(i64) -> i64) {
+    let mut rows = "stamp_ns,log_ns,gyro_x,gyro_y,gyro_z\n".to_owned();
+    for n in 0..2000 {
+        let (log, rate) = (
+            MS * 1_000_000 + 10_000_000 * n,
+            0.3 * (n as f64 * 0.01).sin(),
+        );
+        rows += &format!("{},{log},{rate},0.1,-0.2\n", stamp(n));
+    }
+    std::fs::write(at.join("a.csv"), rows).unwrap();
+}
+
+#[test]
+fn where_the_recorders_clock_goes_on_it_takes_the_place_of_stamps_that_no_gyro_has() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    type Stamps = (fn(i64) -> i64, &'static str);
+    // A second that is always the same, with a microsecond for every one that passes; other units than their name says.
+    let cases: [Stamps; 4] = [
+        (
+            |n| 1_751_654_798 + n / 100 * 1000,
+            "that clock stands still",
+        ),
+        (|n| MS + 10 * n, "that clock stands still"),
+        (
+            |n| MS * 1000 + 10_000 * n,
+            "their unit is 1000 times larger",
+        ),
+        (|n| 10_000_000_000 * n, "their unit is 1000 times smaller"),
+    ];
+    for (stamp, words) in cases {
+        recorded(at, stamp);
+        let ran = replay(at, "a.csv", "");
+        let is_said = ran.out.contains(words) && ran.out.contains("using the log time");
+        assert!(ran.code == Some(0) && is_said, "{ran:?}");
+        assert!((secs(at) - 19.99).abs() < 1e-9, "{words}");
+        let checked = strapd(at, "check a.csv");
+        assert!(checked.out.contains(words), "{checked:?}");
+    }
+    // Both in milliseconds: nothing tells but the steps.
+    let table = std::fs::read_to_string(at.join("a.csv")).unwrap();
+    let rows = table.lines().enumerate().map(|(n, row)| match n {
+        0 => format!("{row}\n"),
+        _ => {
+            let rates = row.splitn(3, ',').last().unwrap();
+            let stamp = MS + 10 * n as i64;
+            format!("{stamp},{stamp},{rates}\n")
+        }
+    });
+    std::fs::write(at.join("a.csv"), rows.collect::<String>()).unwrap();
+    replay(at, "a.csv", "").refused(1, &["stamps are in ns by their name"]);
+}

@@ -16,6 +16,8 @@ pub(super) struct BareStamps {
     waiting: Vec<(RawSample, Option<Bare>)>,
     /// Steps of the stamps that state their unit.
     stated: StatedNanos,
+    /// Steps of the recorder's clock, of rows that carry it beside their stamp.
+    arrivals: StatedNanos,
 }
 
 impl BareStamps {
@@ -32,6 +34,9 @@ impl BareStamps {
         for (raw, bare) in samples.drain(..).zip(bare) {
             if let (Some(stamp), None, false) = (raw.header, bare, raw.is_beside) {
                 self.stated.take(stamp);
+                if raw.log.0 != 0 {
+                    self.arrivals.take(raw.log);
+                }
             }
             self.waiting.push((raw, bare));
         }
@@ -52,9 +57,12 @@ impl BareStamps {
         self.release(true)
     }
 
-    /// Returns the fault of stamps that are in nanoseconds by their name, if there is one.
+    /// Returns the fault of stamps that are in nanoseconds by their name, if there is one. Where the recorder's clock
+    /// ticks as a gyro does, no unit is guessed: its speed tells what the stamps are, and takes their place.
     pub(super) fn too_fast(&self) -> Option<TooFast> {
-        self.stated.too_fast()
+        self.stated
+            .too_fast()
+            .filter(|_| !self.arrivals.are_a_sensors())
     }
 
     /// Returns the number of their steps.

@@ -10,6 +10,8 @@ use strapd_attitude::setting::{COLUMNS, FIELD};
 
 /// Least number of steps that is judged.
 const FEWEST: u64 = 8;
+/// Least number of steps by which a second clock is judged.
+const FEWEST_ARRIVALS: u64 = 128;
 /// Steps of which the ordinary one is named.
 const FIRST: usize = 64;
 /// A longer step counts as this, ns: a pause is none, and a burst of a hundred samples lies between two of them.
@@ -60,13 +62,22 @@ impl StatedNanos {
         self.steps
     }
 
+    /// Whether these are the steps of a sensor, enough of them to judge another clock by.
+    pub(super) fn are_a_sensors(&self) -> bool {
+        self.steps >= FEWEST_ARRIVALS && self.mean() >= SHORTEST_STEP
+    }
+
+    /// The mean step, pauses cut, ns.
+    fn mean(&self) -> i64 {
+        self.sum / i64::try_from(self.steps.max(1)).unwrap_or(i64::MAX)
+    }
+
     /// Returns the steps if most are shorter than any gyro's, other than in bursts, and would be a gyro's in another
     /// unit.
     #[must_use]
     pub fn too_fast(&self) -> Option<TooFast> {
         let is_ordinary = self.steps >= FEWEST && 2 * self.short > self.steps;
-        let mean = self.sum / i64::try_from(self.steps.max(1)).unwrap_or(i64::MAX);
-        if !is_ordinary || mean >= SHORTEST_STEP {
+        if !is_ordinary || self.mean() >= SHORTEST_STEP {
             return None;
         }
         let (step, mut fits) = units_of_steps(self.first.iter().copied())?;
