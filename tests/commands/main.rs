@@ -11,6 +11,7 @@ mod bad_input;
 mod calibration;
 mod check;
 mod cli;
+mod coarse_clocks;
 mod containers;
 mod earth_rate;
 mod empty_topics;

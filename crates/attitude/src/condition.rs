@@ -19,7 +19,7 @@
 //! | same stamp, same data (also when sent again later) | dropped, nothing is lost | `Repeated` |
 //! | same stamp, other data | given a stamp inside the longer step after it, or else before it | `Restamped` |
 //! | ... and no longer step beside it | dropped | `DuplicateStamp` |
-//! | three and more on every stamp: a coarse clock | spread over its step, the first ones at the end of theirs | `Restamped` |
+//! | several on every stamp: a coarse clock | spread over its step, equal ones too, the first ones at the end of theirs | `Restamped` |
 //! | overtaken on its way, by no more than the window | put back | `Reordered` |
 //! | ... by more | dropped | `Late` |
 //! | a counter wraps (16, 24, 32 bits, a day, a week) | stamps go on, counted and shown | `Accepted` |
@@ -59,8 +59,8 @@ pub mod truncation;
 
 pub use crate::record::GyroUnit;
 pub use clock::{
-    BatchRate, Batches, Clock, ClockSpeed, ClockWarning, Period, SpeedPass, SpeedVerdict, batches,
-    choose_clock, choose_clock_as,
+    BatchRate, Batches, Clock, ClockSpeed, ClockWarning, CoarseClock, Period, Sharing, SpeedPass,
+    SpeedVerdict, batches, choose_clock, choose_clock_as, sharing,
 };
 pub use histogram::Histogram;
 pub use memory::Memory;
@@ -157,7 +157,11 @@ impl Conditioner {
                 _ => None,
             },
             gate: Gate::new(settings),
-            order: Order::new(window, max_gap_nanos, batch_line.is_some()),
+            order: Order::new(
+                window,
+                max_gap_nanos,
+                batch_line.is_some() || settings.coarse.is_some(),
+            ),
             spikes: Spikes::of(settings),
             timing,
             window,
@@ -165,9 +169,10 @@ impl Conditioner {
                 (0, SampleKind::Rate) => 0,
                 // The first increment has no interval until the second has come.
                 (0, _) => 1,
+                (window, _) if settings.coarse.is_some() => window,
                 (window, _) => window.max(PRIMING),
             },
-            primed: batch_line.is_some(),
+            primed: batch_line.is_some() || settings.coarse.is_some(),
             batch_line,
             finishing: false,
             trim: (settings.start.is_some() || settings.until.is_some()).then(|| {
@@ -367,7 +372,8 @@ impl Conditioner {
             };
             // The first of a coarse clock's may be the only one of its step that was recorded.
             let is_first = self.timing.coarse().is_some() && self.timing.is_first(entry);
-            if !is_alone || is_first || self.timing.has_passed(entry) {
+            let is_spread = is_first || self.timing.is_on_line();
+            if !is_alone || is_spread || self.timing.has_passed(entry) {
                 if self.drain_shared(out) {
                     continue;
                 }

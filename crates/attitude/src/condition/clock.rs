@@ -5,6 +5,7 @@
 
 mod batch_line;
 mod batches;
+mod coarse;
 mod line;
 mod speed;
 mod steps;
@@ -12,6 +13,7 @@ mod unwrap;
 
 pub(super) use batch_line::BatchLine;
 pub use batches::{BatchRate, Batches, batches};
+pub use coarse::{CoarseClock, Sharing, sharing};
 pub use speed::{ClockSpeed, SpeedPass, SpeedVerdict};
 pub(super) use steps::ClockSteps;
 pub use unwrap::Period;

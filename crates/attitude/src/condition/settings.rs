@@ -3,7 +3,7 @@
 //! A stage of its own so that everything outside can be wrong about a sensor is checked once,
 //! before the first sample, and the hot path needs no checks.
 
-use super::clock::{BatchRate, Clock};
+use super::clock::{BatchRate, Clock, CoarseClock};
 use super::repairs::{SpikePolicy, StampRepair};
 use crate::frames::{AxisMap, Body, Dcm, Sensor};
 use crate::quaternion::BodyRate;
@@ -96,6 +96,8 @@ pub struct Settings {
     pub has_arrival: bool,
     /// The rate of samples that were stamped when their batch came, where a pass over the recording found one.
     pub batches: Option<BatchRate>,
+    /// The clock, where a pass over the first samples found it coarser than the sensor.
+    pub coarse: Option<CoarseClock>,
 }
 
 impl Default for Settings {
@@ -123,6 +125,7 @@ impl Default for Settings {
             repair: StampRepair::Auto,
             has_arrival: true,
             batches: None,
+            coarse: None,
         }
     }
 }
@@ -173,6 +176,7 @@ impl Settings {
             // What was saved is of one daemon, which has none.
             has_arrival: _,
             batches: _,
+            coarse: _,
         } = self;
         let (axes, mount) = (axes.matrix(), mount.as_matrix());
         write!(

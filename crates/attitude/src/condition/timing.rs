@@ -78,18 +78,25 @@ pub(super) struct Timing {
     previous: Option<Previous>,
     /// The step of a coarse clock, nanoseconds.
     coarse: Option<i64>,
+    /// The step of the sensor behind it, nanoseconds, where that was known before the first entry.
+    step: Option<i64>,
 }
 
 impl Timing {
     pub(super) fn new(settings: &Settings, max_gap_nanos: i64) -> Self {
+        let mut spacing = Spacing::new(max_gap_nanos);
+        if let Some(coarse) = &settings.coarse {
+            spacing.prime(&mut [coarse.step.round() as i64; 16]);
+        }
         Timing {
             kind: settings.kind,
             bias: settings.bias.0,
             max_gap_nanos,
             on_gap: settings.on_gap,
-            spacing: Spacing::new(max_gap_nanos),
+            spacing,
             previous: None,
-            coarse: None,
+            coarse: settings.coarse.map(|coarse| coarse.tick),
+            step: settings.coarse.map(|coarse| coarse.step.round() as i64),
         }
     }
 
@@ -136,6 +143,12 @@ impl Timing {
     /// The step of a coarse clock, nanoseconds; `None` where stamps are as fine as samples.
     pub(super) fn coarse(&self) -> Option<i64> {
         self.coarse
+    }
+
+    /// Whether every entry lies on the line of an even sensor behind a coarse clock, those alone on their stamp, too.
+    #[inline]
+    pub(super) fn is_on_line(&self) -> bool {
+        self.step.is_some()
     }
 
     /// Learns the ordinary step from the first entries, before any of them is timed.
@@ -426,6 +439,9 @@ impl Timing {
                 original: at,
             };
         }
+        if let (Some(step), Some(quantum), Some(before)) = (self.step, self.coarse, before) {
+            return on_line(sharing.len(), (before, at), step, quantum);
+        }
         let least = (nominal - nominal / 4).max(1);
         let most = nominal.saturating_add(nominal / 4);
         let spread = |room: i64, n: i64| match room / n {
@@ -436,11 +452,11 @@ impl Timing {
         };
         let (keep, step, backwards) = if room_after / n >= least {
             (n, spread(room_after, n), false)
+        } else if self.coarse.is_some() {
+            // A rate that has risen: no clock but this one says how many there are. None was taken before its stamp.
+            (n, room_after / n, false)
         } else if room_before / n >= least {
             (n, spread(room_before, n), true)
-        } else if self.coarse.is_some() {
-            // A rate that has risen: no clock but this one says how many there are.
-            (n, room_after / n, false)
         } else {
             let keep = (room_after / least).clamp(1, n);
             (keep, spread(room_after, keep), false)
@@ -458,6 +474,22 @@ impl Timing {
             keep: (keep - left).max(0) as usize,
             original: at,
         }
+    }
+}
+
+/// Places of `n` samples in the step of a coarse clock that begins `at`: the sensor's own steps go on from the sample
+/// `before`. The first of a step of the clock lies within a step of the sensor of its beginning, and none beyond its end.
+fn on_line(n: usize, (before, at): (Nanos, Nanos), step: i64, quantum: i64) -> Placement {
+    let latest = at.0.saturating_add(step.saturating_sub(1).max(0));
+    let from = before.0.saturating_add(step).clamp(at.0, latest);
+    let last = at.0.saturating_add(quantum.saturating_sub(1));
+    let between = i64::try_from(n).unwrap_or(i64::MAX).saturating_sub(1);
+    let most = last.saturating_sub(from) / between.max(1);
+    Placement {
+        from: Nanos(from),
+        step: step.min(most).max(1),
+        keep: n,
+        original: at,
     }
 }
 

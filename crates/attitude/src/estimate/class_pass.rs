@@ -8,7 +8,7 @@ use super::first_pass::MANY;
 use super::meaning::{Meaning, STANDARD_GRAVITY};
 use super::plan::{Aid, EstimationSettings, NOISE_PRESETS, Noise, NoisePreset};
 use crate::aid::{AidedPropagator, Calibration, Settings};
-use crate::condition::{self, Clock, Conditioner};
+use crate::condition::{self, Clock, CoarseClock, Conditioner};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
 use crate::frames::{Body, In, Nav};
@@ -51,6 +51,7 @@ pub(super) struct Run<'a> {
     pub(super) plan: &'a EstimationSettings,
     pub(super) resolved: &'a Meaning,
     pub(super) clock: Clock,
+    pub(super) coarse: Option<CoarseClock>,
     pub(super) bias: BodyRate,
     pub(super) initial: Quaternion<Nav, Body>,
     pub(super) world_rate: In<Nav>,
@@ -117,6 +118,7 @@ impl ClassPass {
         let conditioning = condition::Settings {
             accel_scale: conditioning.accel_scale * wide.force_scale,
             truncation_step: run.truncation_step,
+            coarse: run.coarse,
             ..conditioning
         };
         let propagation = propagate::Settings {

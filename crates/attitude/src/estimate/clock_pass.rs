@@ -5,19 +5,73 @@
 
 use super::plan::EstimationSettings;
 use crate::condition::{
-    BatchRate, Batches, Clock, ClockSpeed, SpeedPass, SpeedVerdict, StampRepair, batches,
+    BatchRate, Batches, Clock, ClockSpeed, CoarseClock, Sharing, SpeedPass, SpeedVerdict,
+    StampRepair, batches, sharing,
 };
 use crate::diagnostic::Diagnostic;
-use crate::record::RawSample;
+use crate::record::{Nanos, RawSample};
 use crate::setting::{RATE_HZ, STAMPS, TIME};
 
 /// Samples that are looked at: of a sensor that is read in batches, thousands of them.
 const LOOKED_AT: usize = 20_000;
 
+/// The same of a stream, whose samples wait meanwhile.
+const LOOKED_AT_IN_STREAM: usize = 8192;
+/// Different stamps by which a coarse clock can be told, and samples on each from which it may be one.
+const STAMPS_TOLD_BY: usize = 6;
+const SHARING: usize = 3;
+
 /// Stamps, arrivals and rates of the first samples.
 #[derive(Clone, Debug, Default)]
 pub struct ClockPass {
     samples: Vec<RawSample>,
+    shared: SharedStamps,
+    /// Samples of a stream, of which only a coarse clock is told.
+    is_stream: bool,
+}
+
+/// Number of samples and of their stamps: whether a clock may be coarse and too few of its steps were seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SharedStamps {
+    samples: usize,
+    stamps: usize,
+    last: Option<Nanos>,
+}
+
+impl SharedStamps {
+    pub(super) fn take(&mut self, raw: &RawSample) {
+        let stamp = raw.header.filter(|stamp| stamp.0 != 0);
+        self.samples += 1;
+        if stamp.is_none() || stamp != self.last {
+            (self.stamps, self.last) = (self.stamps + 1, stamp);
+        }
+    }
+
+    pub(super) fn want_more(&self) -> bool {
+        self.stamps < STAMPS_TOLD_BY
+            && self.samples > SHARING * self.stamps.saturating_sub(1).max(1)
+            && self.samples < LOOKED_AT_IN_STREAM
+    }
+}
+
+/// The clock of samples that share their stamps, where it is coarser than the sensor.
+pub(super) fn coarse_clock(
+    samples: &[RawSample],
+    clock: Clock,
+    repair: StampRepair,
+) -> Option<CoarseClock> {
+    match shared(samples, clock) {
+        Sharing::Coarse(found) if repair == StampRepair::Auto => Some(found),
+        _ => None,
+    }
+}
+
+fn shared(samples: &[RawSample], clock: Clock) -> Sharing {
+    let stamped = samples.iter();
+    let stamped: Vec<(i64, &RawSample)> = stamped
+        .filter_map(|raw| Some((clock.read(raw)?.0, raw)))
+        .collect();
+    sharing(&stamped)
 }
 
 /// Verdict of a [`ClockPass`].
@@ -25,6 +79,8 @@ pub struct ClockPass {
 pub struct ClockVerdict {
     /// The rate of samples that were stamped when their batch came.
     pub batches: Option<BatchRate>,
+    /// The clock, where it is coarser than the sensor.
+    pub coarse: Option<CoarseClock>,
     /// Message about batches.
     pub of_batches: Option<Diagnostic>,
     /// Message about two clocks that run at different speeds.
@@ -41,9 +97,19 @@ impl ClockPass {
         (!is_left).then(ClockPass::default)
     }
 
+    /// The same for samples that cannot be read again.
+    #[must_use]
+    pub(super) fn of_stream(self) -> ClockPass {
+        ClockPass {
+            is_stream: true,
+            ..self
+        }
+    }
+
     /// Takes the next sample; more than are looked at are passed over.
     pub fn take(&mut self, raw: &RawSample) {
-        if self.wants_more() {
+        if self.samples.len() < LOOKED_AT {
+            self.shared.take(raw);
             self.samples.push(*raw);
         }
     }
@@ -51,12 +117,32 @@ impl ClockPass {
     /// Whether more samples would tell more.
     #[must_use]
     pub fn wants_more(&self) -> bool {
-        self.samples.len() < LOOKED_AT
+        match self.is_stream {
+            true => self.shared.want_more(),
+            false => self.samples.len() < LOOKED_AT,
+        }
     }
 
     /// Judges the samples that were taken, on `clock`.
     #[must_use]
     pub fn finish(self, clock: Clock) -> ClockVerdict {
+        let coarse = match shared(&self.samples, clock) {
+            Sharing::None if self.is_stream => return ClockVerdict::default(),
+            Sharing::None => None,
+            Sharing::Coarse(found) => Some(Some(found)),
+            Sharing::Repeats => Some(None),
+        };
+        if let Some(coarse) = coarse {
+            let of_speed = match self.is_stream {
+                true => None,
+                false => self.of_speed(clock),
+            };
+            return ClockVerdict {
+                coarse,
+                of_speed,
+                ..ClockVerdict::default()
+            };
+        }
         let stamped = self.samples.iter();
         let (stamps, rates): (Vec<i64>, Vec<[f64; 3]>) = stamped
             .filter_map(|raw| Some((clock.read(raw)?.0, raw.gyro?)))
@@ -69,11 +155,14 @@ impl ClockPass {
         ClockVerdict {
             batches: rate,
             of_batches,
-            of_speed: self
-                .speed(clock)
-                .filter(is_wrong)
-                .map(|found| of_speed(&found)),
+            coarse: None,
+            of_speed: self.of_speed(clock),
         }
+    }
+
+    fn of_speed(&self, clock: Clock) -> Option<Diagnostic> {
+        let found = self.speed(clock).filter(is_wrong)?;
+        Some(of_speed(&found))
     }
 
     fn speed(&self, clock: Clock) -> Option<ClockSpeed> {
@@ -138,7 +227,6 @@ fn of_speed(found: &ClockSpeed) -> Diagnostic {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::record::Nanos;
 
     fn verdict(header: impl Fn(i64) -> i64) -> ClockVerdict {
         let mut pass = ClockPass::of(&EstimationSettings::default()).unwrap();

@@ -626,6 +626,7 @@ fn conditioning(
         truncation_step: prepared.truncation_step,
         has_arrival: prepared.has_arrival,
         batches: prepared.batches,
+        coarse: prepared.coarse,
         gyro_range: prepared.gyro_range,
         ..settings
     }

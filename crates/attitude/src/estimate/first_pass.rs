@@ -3,10 +3,11 @@
 //! Apart from the preparation because it decides, and a pass only looks: at samples conditioned as in
 //! the run, with no bias taken out, on the clock the first of them choose.
 
+use super::clock_pass::{SharedStamps, coarse_clock};
 use super::meaning::Meaning;
 use super::plan::EstimationSettings;
 use crate::condition::stillness::{Limits, Rests, Stillness};
-use crate::condition::{ClockSet, Conditioner, choose_clock_as};
+use crate::condition::{self, ClockSet, Conditioner, choose_clock_as};
 use crate::diagnostic::Diagnostic;
 use crate::quaternion::BodyRate;
 use crate::record::{Counts, RateSample, RawSample};
@@ -22,6 +23,7 @@ pub struct Conditioned {
     plan: EstimationSettings,
     resolved: Meaning,
     gathered: Vec<RawSample>,
+    shared: SharedStamps,
     running: Option<Conditioner>,
     rates: Vec<RateSample>,
 }
@@ -34,6 +36,7 @@ impl Conditioned {
             plan: plan.clone(),
             resolved: resolved.clone(),
             gathered: Vec::new(),
+            shared: SharedStamps::default(),
             running: None,
             rates: Vec::new(),
         }
@@ -52,7 +55,8 @@ impl Conditioned {
             Some(conditioner) => conditioner.push(raw, &mut self.rates),
             None => {
                 self.gathered.extend_from_slice(raw);
-                if self.gathered.len() >= FEW {
+                raw.iter().for_each(|raw| self.shared.take(raw));
+                if self.gathered.len() >= FEW && !self.shared.want_more() {
                     self.begin()?;
                 }
             }
@@ -95,6 +99,10 @@ impl Conditioned {
         let settings = self
             .resolved
             .conditioning(&self.plan, clock, BodyRate::ZERO);
+        let settings = condition::Settings {
+            coarse: coarse_clock(&gathered, clock, settings.repair),
+            ..settings
+        };
         let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
         conditioner.push(&gathered, &mut self.rates);
         self.running = Some(conditioner);

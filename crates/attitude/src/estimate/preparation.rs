@@ -19,7 +19,7 @@ use super::plan::{Aid, Bias, EstimationSettings, Initial, Noise, Truncation};
 use super::stamps::{StampPass, Stamps};
 use crate::condition::rails::Rails;
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
-use crate::condition::{BatchRate, Clock};
+use crate::condition::{BatchRate, Clock, CoarseClock};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Method;
@@ -70,6 +70,8 @@ pub struct Prepared {
     pub truncation_step: Option<f64>,
     /// The rate of samples that were stamped when their batch came.
     pub batches: Option<BatchRate>,
+    /// The clock, where it is coarser than the sensor.
+    pub coarse: Option<CoarseClock>,
     /// Full scale of the gyro, rad/s, that was stated or that its samples were clipped at.
     pub gyro_range: Option<f64>,
     /// Things to know.
@@ -133,7 +135,10 @@ impl Preparation {
                 && matches!(resolved.kind, SampleKind::Rate | SampleKind::Average))
             .then(Rails::new),
             beside: Vec::new(),
-            clocks: ClockPass::of(plan).filter(|_| patience == Patience::WholeLog),
+            clocks: ClockPass::of(plan).map(|pass| match patience {
+                Patience::WholeLog => pass,
+                Patience::FirstMinute => pass.of_stream(),
+            }),
             class: ClassPass::of(plan).filter(|_| patience == Patience::WholeLog),
             forces_beside: [false; 2],
         }
@@ -224,6 +229,9 @@ impl Preparation {
                     || wants_class
             }
             Patience::FirstMinute => {
+                if self.clocks.as_ref().is_some_and(ClockPass::wants_more) {
+                    return true;
+                }
                 self.rest.is_some()
                     && self.taken < MANY
                     && secs(first.header, last.header) < REST_SECS
@@ -253,7 +261,7 @@ impl Preparation {
             ..
         } = self;
         let mut warnings = Vec::new();
-        let (clock, batches) = decide_clock((&plan, &resolved), &first, clocks, &mut warnings)?;
+        let (clock, clocks) = decide_clock((&plan, &resolved), &first, clocks, &mut warnings)?;
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         // The method of a daemon decides as a daemon: by the first sample.
         let (looked_at, is_beside) = match plan.method {
@@ -344,7 +352,8 @@ impl Preparation {
             world,
             stamps,
             has_arrival: true,
-            batches,
+            batches: clocks.batches,
+            coarse: clocks.coarse,
             warnings,
         };
         let told = class.zip(prepared.aiding).and_then(|(class, aiding)| {
@@ -352,6 +361,7 @@ impl Preparation {
                 plan: &plan,
                 resolved: &resolved,
                 clock,
+                coarse: clocks.coarse,
                 bias,
                 initial,
                 world_rate: prepared.world_rate,
@@ -442,6 +452,7 @@ pub fn at_once(
     Ok(Prepared {
         has_arrival: false,
         batches: None,
+        coarse: None,
         noise: plan.noise.taken(),
         aiding,
         truncation_step: decide_truncation(plan, None, &mut warnings)?,

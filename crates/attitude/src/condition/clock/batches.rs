@@ -29,9 +29,6 @@ const LEAST_BATCHES: usize = 5;
 /// Longest step that is surely no gap, nanoseconds, and in median steps.
 const GAP: f64 = 1e9;
 const GAP_STEPS: f64 = 20.0;
-/// Longest step of a coarse clock, nanoseconds, and its least share of the time of what would be a batch.
-const TICK_LONGEST: i64 = 10_000_000_000;
-const TICK_SHARE: f64 = 0.5;
 
 /// Verdict about stamps.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -95,9 +92,6 @@ pub fn batches(stamps: &[i64], rates: &[[f64; 3]]) -> Batches {
         return Batches::None;
     }
     let usual = median(&mut took.clone());
-    if is_counted(stamps, usual) {
-        return Batches::None;
-    }
     let whole = took.len().saturating_sub(1);
     let off: Vec<f64> = took
         .iter()
@@ -128,22 +122,6 @@ pub fn batches(stamps: &[i64], rates: &[[f64; 3]]) -> Batches {
     } else {
         Batches::Unsure(rate)
     }
-}
-
-/// Whether the clock counts in steps as long as what would be a batch (`took`, nanoseconds): it is coarse then, and its
-/// ticks say nothing of when samples were read.
-fn is_counted(stamps: &[i64], took: f64) -> bool {
-    let mut tick = TICK_LONGEST;
-    while tick >= 1_000 && tick as f64 >= TICK_SHARE * took {
-        for tick in [tick, tick / 2, tick / 5] {
-            let is_whole = tick as f64 >= TICK_SHARE * took;
-            if is_whole && stamps.iter().all(|stamp| stamp % tick == 0) {
-                return true;
-            }
-        }
-        tick /= 10;
-    }
-    false
 }
 
 fn step_of(pair: &[i64]) -> i64 {

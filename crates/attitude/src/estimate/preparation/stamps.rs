@@ -4,9 +4,9 @@
 //! Apart from the rest of the preparation because nothing else of it looks at clocks.
 
 use super::Patience;
-use crate::condition::{BatchRate, Clock, ClockWarning, choose_clock_as};
+use crate::condition::{Clock, ClockWarning, choose_clock_as};
 use crate::diagnostic::Diagnostic;
-use crate::estimate::clock_pass::ClockPass;
+use crate::estimate::clock_pass::{ClockPass, ClockVerdict};
 use crate::estimate::intervals::Mismatch;
 use crate::estimate::meaning::Meaning;
 use crate::estimate::plan::EstimationSettings;
@@ -14,27 +14,28 @@ use crate::estimate::stamps::{StampPass, Stamps};
 use crate::record::RawSample;
 use crate::setting::REGULARISE_STAMPS;
 
-/// Decides whose stamps count, and whether they are those of batches.
+/// Decides whose stamps count, and whether they are those of batches or of a coarse clock.
 pub(super) fn decide_clock(
     (plan, resolved): (&EstimationSettings, &Meaning),
     first: &[RawSample],
     clocks: Option<ClockPass>,
     warnings: &mut Vec<Diagnostic>,
-) -> Result<(Clock, Option<BatchRate>), Diagnostic> {
+) -> Result<(Clock, ClockVerdict), Diagnostic> {
     let (clock, warning) = choose_clock_as(first, plan.clock, plan.stamps);
     if let Some(fatal @ ClockWarning::NoneMoves) = warning {
         return Err(Diagnostic::from(&fatal));
     }
     warnings.extend(warning.iter().map(Diagnostic::from));
-    let clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
-    warnings.extend(clocks.of_batches.into_iter().chain(clocks.of_speed));
+    let mut clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
+    warnings.extend(clocks.of_batches.take());
+    warnings.extend(clocks.of_speed.take());
     if let Some(mismatch) = Mismatch::between(first, clock, resolved.kind) {
         if !resolved.interval_unit_given {
             return Err(mismatch.refusal(resolved.interval.as_ref()));
         }
         warnings.push(format!("{mismatch}: what lies between is bridged").into());
     }
-    Ok((clock, clocks.batches))
+    Ok((clock, clocks))
 }
 
 /// Decides how stamps are made regular, where that was asked for.

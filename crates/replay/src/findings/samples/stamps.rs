@@ -46,9 +46,10 @@ pub(super) fn clocks(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     out.extend(of_batches.map(|said| Finding::said(Severity::Warning, "batches", said)));
 }
 
-/// Whether steps are those of batches, of which neither jitter nor missing samples can be told.
-fn are_of_batches(seen: &Seen<'_>) -> bool {
-    seen.looked.clocks.batches.is_some()
+/// Whether steps are those of batches or of a coarse clock, of which neither jitter nor missing samples can be told.
+fn are_spread(seen: &Seen<'_>) -> bool {
+    let clocks = &seen.looked.clocks;
+    clocks.batches.is_some() || clocks.coarse.is_some()
 }
 
 /// The 99th percentile of the jitter over the step, where it is worth a word.
@@ -68,7 +69,7 @@ fn noisy_lines(q: &QualitySummary) -> Option<&Lines> {
 /// Steps that jitter: about straight lines, about none, or as nobody has laid any.
 pub(super) fn jitter(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    let Some(share) = jitter_of_steps(q).filter(|_| !are_of_batches(seen)) else {
+    let Some(share) = jitter_of_steps(q).filter(|_| !are_spread(seen)) else {
         return;
     };
     let said = |more: &str| {
@@ -94,7 +95,7 @@ pub(super) fn jitter(seen: &Seen<'_>, out: &mut Vec<Finding>) {
 /// Stamps that jitter about straight lines, by less than single steps tell.
 pub(super) fn slight_jitter(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    if jitter_of_steps(q).is_none() && !are_of_batches(seen) {
+    if jitter_of_steps(q).is_none() && !are_spread(seen) {
         out.extend(noisy_lines(q).map(|lines| about_lines(seen, lines)));
     }
 }
@@ -146,7 +147,7 @@ pub(super) fn drift(seen: &Seen<'_>, out: &mut Vec<Finding>) {
 /// Samples that are missing.
 pub(super) fn missing(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    if q.missing > 0 && lacks(q) && !are_of_batches(seen) {
+    if q.missing > 0 && lacks(q) && !are_spread(seen) {
         out.push(missing_samples(q.missing, q.longest_gap_secs, q.gaps));
     }
 }
