@@ -100,6 +100,10 @@ impl Words {
         )?;
         selection.decode.columns = self.parsed("columns")?;
         selection.decode.delimiter = self.parsed("delimiter")?;
+        let rows = self.all("where").iter().map(|row| row.parse());
+        selection.decode.rows = rows
+            .collect::<std::result::Result<_, String>>()
+            .map_err(|why| usage(format!("where: {why}")))?;
         Ok(selection)
     }
 

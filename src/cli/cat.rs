@@ -119,6 +119,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     )?;
     let mut decoders = Decoders::new(&options);
     let reading = TopicReading::new(&log, args.topic.as_deref(), &mut decoders)?.with_fields();
+    reading.say_note();
     let mut printer = Printer::new(args.format, reading.name(), args.count)?;
     let lost = reading.walk_in_flu::<Error>(&pool, |raw, kind| {
         let wants_more = printer

@@ -185,6 +185,7 @@ fn read(
 ) -> Result<Read> {
     let mut decoders = Decoders::new(options);
     let reading = TopicReading::new(log, args.topic.as_deref(), &mut decoders)?.with_fields();
+    reading.say_note();
     let topic = reading.name().to_owned();
     let id = args.id.as_deref().unwrap_or(&topic);
     let (mut batch, mut seq) = (Vec::with_capacity(BATCH), 0);

@@ -1,4 +1,5 @@
-//! `--columns`, `--delimiter`: what the columns of a table of text are, where its names do not tell. Pure.
+//! `--columns`, `--delimiter`, `--where`: what the columns of a table of text are, where its names do not tell, and which
+//! of its rows are read. Pure.
 
 use crate::error::{Error, Result};
 use clap::Args;
@@ -17,6 +18,11 @@ pub struct Tables {
     /// Delimiter between the cells of a table: tab, semicolon, comma, pipe, blanks, or a punctuation mark
     #[arg(long, value_name = "MARK")]
     pub delimiter: Option<String>,
+    /// Rows of a table that are read: those of this value in a column; others are left out and counted
+    ///
+    /// May be given several times: values of one column are alternatives, different columns must all fit.
+    #[arg(long = "where", value_name = "COLUMN=VALUE")]
+    pub rows: Vec<String>,
 }
 
 impl Tables {
@@ -33,6 +39,10 @@ impl Tables {
         options.delimiter = delimiter
             .transpose()
             .map_err(|why| Error::usage(format!("--delimiter: {why}")))?;
+        let rows = self.rows.iter().map(|row| row.parse());
+        options.rows = rows
+            .collect::<std::result::Result<_, String>>()
+            .map_err(|why| Error::usage(format!("--where: {why}")))?;
         Ok(())
     }
 }

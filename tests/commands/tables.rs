@@ -384,3 +384,103 @@ fn what_is_missing_is_asked_for_and_a_flag_that_says_nothing_is_refused() {
         "{info:?}"
     );
 }
+
+/// A table of two sensors at 100 Hz, the second of which turns the other way.
+fn of_two(column: &str, names: [&str; 2]) -> String {
+    let mut text = format!("time_ms,{column},gyro_x[rad/s],gyro_y[rad/s],gyro_z[rad/s]\n");
+    for n in 0..400 {
+        for (name, sign) in names.iter().zip([1.0, -1.0]) {
+            let rate = sign * (f64::from(n) * 0.01).sin();
+            writeln!(text, "{},{name},{rate},{sign},0.1", n * 10).unwrap();
+        }
+    }
+    text
+}
+
+#[test]
+fn of_two_sensors_in_a_table_the_first_is_taken_and_the_other_is_named_with_what_takes_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let columns = [
+        ("device", ["left", "right"]),
+        ("imu_id", ["0", "1"]),
+        ("MAC", ["d4:22:cd:00:00:01", "d4:22:cd:00:00:02"]),
+        ("instance", ["3", "7"]),
+    ];
+    for (column, [first, second]) in columns {
+        std::fs::write(at.join("two.csv"), of_two(column, [first, second])).unwrap();
+        let ran = strapd(at, "replay two.csv -o out.csv --force --json");
+        let topic = ran.json()["topics"][0].clone();
+        assert_eq!(
+            (&topic["topic"], &topic["samples"]["used"]),
+            (&first.into(), &400.into())
+        );
+        let said = topic["findings"].to_string();
+        for part in [
+            "several-topics",
+            &format!("column {column}"),
+            &format!("left out {second} (400 samples)"),
+            &format!("--topic {second}"),
+        ] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        let (taken, _, _) = attitudes(at, "two.csv", Vec::new());
+        let alone = format!("two.csv --where {column}={first}");
+        assert_eq!(attitudes(at, &alone, Vec::new()).0, taken, "{column}");
+        let other = attitudes(at, &format!("two.csv --topic {second}"), Vec::new());
+        assert_ne!(other.0, taken);
+        let info = strapd(at, "info two.csv");
+        assert!(
+            info.out.contains(first) && info.out.contains(second),
+            "{info:?}"
+        );
+        let listed = strapd(at, "cat two.csv");
+        assert!(
+            listed.err.contains(&format!("left out {second}")),
+            "{listed:?}"
+        );
+    }
+}
+
+#[test]
+fn rows_of_another_value_are_left_out_and_counted_from_a_file_and_a_pipe() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let text = of_two("body", ["1", "2"]);
+    std::fs::write(at.join("two.csv"), &text).unwrap();
+    let lines = text.lines().enumerate();
+    let alone: String = lines
+        .filter(|(n, _)| n % 2 == 0)
+        .map(|(_, row)| format!("{row}\n"))
+        .collect();
+    // The header, and every second row behind it.
+    let alone = format!(
+        "{}\n{}",
+        text.lines().next().unwrap(),
+        alone.split_once('\n').unwrap().1
+    );
+    std::fs::write(at.join("one.csv"), alone).unwrap();
+    let (expected, ..) = attitudes(at, "one.csv", Vec::new());
+    for source in ["two.csv", "-"] {
+        let flags = format!("{source} --where body=2");
+        let (rows, _, said) = attitudes(at, &flags, text.clone().into_bytes());
+        assert_eq!(rows, expected, "{source}");
+        assert!(said.contains("400 of 800 rows were left out"), "{said}");
+    }
+    for (flags, words) in [
+        (
+            "--where colour=red",
+            &["no column `colour`", "time_ms, body, gyro_x"][..],
+        ),
+        (
+            "--where body=3",
+            &["none of 800 rows", "they have body 1, 2"],
+        ),
+    ] {
+        for source in ["two.csv", "-"] {
+            let command = format!("replay {source} -o null: {flags}");
+            strapd_fed(at, &command, text.clone()).refused(1, words);
+        }
+    }
+    strapd(at, "replay two.csv -o null: --where body").refused(2, &["no COLUMN=VALUE"]);
+}

@@ -195,6 +195,7 @@ settings! {
     UNDO_TRUNCATION = "undo_truncation";
     UNTIL = "until";
     WINDOW = "window";
+    WHERE = "where";
     WORLD = "world";
 }
 

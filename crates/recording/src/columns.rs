@@ -6,10 +6,13 @@ mod cells;
 mod given;
 mod increments;
 mod names;
+mod rows;
 mod units;
 
 pub use cells::Delimiter;
 pub use given::Columns;
 pub(crate) use given::{Given, Role};
 pub(crate) use names::{Kind, Meant, Name};
+pub use rows::RowFilter;
+pub(crate) use rows::RowSelection;
 pub(crate) use units::{Quantity, Unit};

@@ -52,7 +52,7 @@ pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::setting::{FIELD, TOPIC};
 
-use crate::columns::{Columns, Delimiter};
+use crate::columns::{Columns, Delimiter, RowFilter};
 use crate::text::printable;
 use registers::{Form, Slot, StampForm};
 use ros::fifo::Fifo;
@@ -115,6 +115,8 @@ pub struct Options {
     pub columns: Option<Columns>,
     /// `--delimiter`: what stands between the cells of a table.
     pub delimiter: Option<Delimiter>,
+    /// `--where`: the rows of a table that are read; others are left out and counted.
+    pub rows: Vec<RowFilter>,
     /// Use data that its covariance (-1) marks as absent.
     pub ignore_covariance_flag: bool,
     /// Child frame whose transform is taken when a message holds several; else the first.

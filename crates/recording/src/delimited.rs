@@ -17,7 +17,7 @@ mod preamble;
 mod rows;
 mod time_of_day;
 
-pub use crate::columns::{Columns, Delimiter};
+pub use crate::columns::{Columns, Delimiter, RowFilter};
 pub use rows::Table;
 
 #[cfg(feature = "parquet")]

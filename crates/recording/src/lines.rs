@@ -5,6 +5,7 @@
 mod beside;
 mod packed;
 
+use crate::columns::RowSelection;
 use crate::decode::packed::{HEAD, MARK, length};
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
 use crate::delimited::{Opening, SampledLine, Table};
@@ -181,6 +182,12 @@ impl<R: Read> Lines<R> {
         let own = self.table().map(Table::notes).unwrap_or_default();
         let others = self.beside.iter().flat_map(SidecarFile::notes);
         own.iter().cloned().chain(others).collect()
+    }
+
+    /// Rows of its table that are read, and the count of those that are not.
+    #[must_use]
+    pub(crate) fn selection(&self) -> Option<&RowSelection> {
+        self.table().map(Table::selection)
     }
 
     /// Meaning of all samples that is declared before the first: the names of a table may state units.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Path = Union[str, "os.PathLike[str]"]
 
 #: The flags of ``strapd replay`` that are arguments here, ``-`` as ``_``: every setting, and how a log is read.
-FLAGS = SETTINGS | frozenset("topic field columns delimiter accel_topic mag_topic ignore_covariance_flag out_rate threads".split())
+FLAGS = SETTINGS | frozenset("topic field columns delimiter where accel_topic mag_topic ignore_covariance_flag out_rate threads".split())
 
 #: Those that the environment may say too, as for the command.
 OF_THE_ENVIRONMENT = {**ENVIRONMENT, "threads": "STRAPD_THREADS"}

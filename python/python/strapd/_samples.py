@@ -19,7 +19,7 @@ Motion = Literal[
 ]
 
 #: What :func:`read` takes: how samples are found in a log, and by which clock.
-OF_READING = frozenset("field columns delimiter ignore_covariance_flag time threads".split())
+OF_READING = frozenset("field columns delimiter where ignore_covariance_flag time threads".split())
 
 
 class Samples:
@@ -111,7 +111,7 @@ def read(path: Path, topic: Optional[str] = None, *, strict: bool = False, **how
 
     :param topic: its name; needed where a log has several.
     :param strict: raise :class:`Error` where something of the log was lost, instead of a :class:`LossWarning`.
-    :param how: ``time`` (``header``, ``log``, ``publish``: which stamp is ``t``), ``field``, ``columns``, ``delimiter`` as in
+    :param how: ``time`` (``header``, ``log``, ``publish``: which stamp is ``t``), ``field``, ``columns``, ``delimiter``, ``where`` as in
         ``strapd replay``.
     """
     strange = set(how) - OF_READING

@@ -105,7 +105,7 @@ pub(super) fn gather(
         }
         Ok(ControlFlow::Continue(()))
     })?;
-    let mut notes: Vec<String> = reading.note.iter().cloned().collect();
+    let mut notes: Vec<String> = reading.note.iter().map(ToString::to_string).collect();
     notes.extend(problems(&survey));
     gathering
         .finish(

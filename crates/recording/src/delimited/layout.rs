@@ -12,7 +12,7 @@ use super::column::{Column, is_comment};
 use super::preamble::{Maker, Preamble};
 use super::rows::{LOST, Table};
 use crate::columns::Delimiter;
-use crate::columns::{Columns, Role};
+use crate::columns::{Columns, Role, RowFilter, RowSelection};
 use crate::columns::{Kind, Meant, Name};
 use crate::columns::{Quantity, Unit};
 use crate::decode::{Options, Wanted};
@@ -152,6 +152,8 @@ fn number(column: &str) -> Option<usize> {
 pub(crate) struct Opening {
     given: Option<Columns>,
     delimiter: Option<Delimiter>,
+    /// Rows that are read.
+    filters: Vec<RowFilter>,
     /// Name of the file, without its ending.
     stem: String,
     wanted: Wanted,
@@ -187,6 +189,7 @@ impl Opening {
         Opening {
             given: options.columns.clone(),
             delimiter: options.delimiter,
+            filters: options.rows.clone(),
             stem: stem.to_owned(),
             wanted: options.wanted,
             lines: Vec::new(),
@@ -286,7 +289,9 @@ impl Opening {
         let first_row = found.at + usize::from(found.is_header);
         let mut behind = self.lines.iter().enumerate().skip(first_row);
         if found.is_own {
-            return Ok((Table::own(line)?, numbered(behind, &self.repeated)));
+            let mut table = Table::own(line)?;
+            table.selection = RowSelection::of(&self.filters, &table.names(), false)?;
+            return Ok((table, numbered(behind, &self.repeated)));
         }
         let preamble = self.lines.iter().take(found.at).map(Vec::as_slice);
         let preamble = Preamble::of(preamble);
@@ -322,6 +327,7 @@ impl Opening {
             above -= usize::from(line.is_some_and(|(_, line)| is_row(line)));
         }
         check_lengths(&rows, &names, found.delimiter)?;
+        let selection = self.selected(&names, &mut rows)?;
         let header = if found.is_header { row } else { &[] };
         let roles = Roles {
             names: &names,
@@ -333,7 +339,25 @@ impl Opening {
         };
         let mut table = roles.table(header, found.delimiter)?;
         table.given = self.given;
+        table.selection = selection;
         Ok((table, numbered(behind, &self.repeated)))
+    }
+
+    /// Rows that are read of a table with these columns; the first ones, by which it is told how, are those.
+    ///
+    /// # Errors
+    /// A column that is not there.
+    fn selected(
+        &self,
+        names: &[Name],
+        first: &mut Vec<Vec<String>>,
+    ) -> Result<RowSelection, Diagnostic> {
+        let names: Vec<&str> = names.iter().map(|name| name.text.as_str()).collect();
+        let selection = RowSelection::of(&self.filters, &names, self.wanted != Wanted::Rates)?;
+        if first.iter().any(|row| selection.has(row)) {
+            first.retain(|row| selection.has(row));
+        }
+        Ok(selection)
     }
 
     /// Refusal of a text without a header: what there is, and what would help.

@@ -8,7 +8,7 @@ use super::layout;
 use super::own;
 use super::preamble;
 use crate::columns::Columns;
-use crate::columns::Delimiter;
+use crate::columns::{Delimiter, RowSelection};
 use crate::decode::{Class, Line, MAX_LINE, Undecodable, exact_name};
 use crate::text::without_mark;
 use crate::text::{printable, snippet};
@@ -82,6 +82,8 @@ pub struct Table {
     pub(super) notes: Vec<String>,
     /// Rows so far.
     row: u64,
+    /// Rows that are read.
+    pub(super) selection: RowSelection,
     /// Columns that the user named, by which another table's header is recognised.
     pub(super) given: Option<Columns>,
     /// Another table has begun, whose rows are none of this.
@@ -162,6 +164,7 @@ impl Table {
             assumed: String::new(),
             notes: Vec::new(),
             row: 0,
+            selection: RowSelection::default(),
             given: None,
             is_elsewhere: false,
         }
@@ -177,6 +180,28 @@ impl Table {
     #[must_use]
     pub fn assumed(&self) -> &str {
         &self.assumed
+    }
+
+    /// Rows that are read, and the count of those that are not.
+    #[must_use]
+    pub(crate) fn selection(&self) -> &RowSelection {
+        &self.selection
+    }
+
+    /// Name of the columns that tell the sensors of a table apart; `None` where there are none.
+    #[must_use]
+    pub(crate) fn sensor_column(&self) -> Option<String> {
+        let columns = self.columns.iter();
+        let named: Vec<&str> = columns
+            .filter(|(column, _)| *column == Some(Column::Id))
+            .map(|(_, name)| name.as_str())
+            .collect();
+        (!named.is_empty()).then(|| named.join(", "))
+    }
+
+    /// The names of its columns.
+    pub(super) fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|(_, name)| name.as_str()).collect()
     }
 
     /// Notes for its reader: what was taken for granted, what is not used.
@@ -268,6 +293,9 @@ impl Table {
         if self.is_elsewhere {
             self.row += 1;
             return Err(self.explained(row, Undecodable::OtherTable));
+        }
+        if !self.selection.takes(row, self.delimiter) {
+            return Ok(no_row("left out"));
         }
         let sum = self.clock.sum();
         let read = self.cells(row).and_then(|read| self.line(read, out));

@@ -9,7 +9,7 @@ use crate::lines::Lines;
 use std::io::Read;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::setting::{COLUMNS, DELIMITER, FIELD};
+use strapd_attitude::setting::{COLUMNS, DELIMITER, FIELD, WHERE};
 
 /// Begins to read lines or rows.
 ///
@@ -35,18 +35,18 @@ pub(super) fn open<R: Read>(
     Lines::new(path, format, input, options)
 }
 
-/// `--columns` and `--delimiter` say nothing of anything but a table.
+/// Refuses `--columns`, `--delimiter` and `--where` for anything but a table.
 ///
 /// # Errors
 /// One of them is given.
 pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) -> Result<()> {
-    if options.columns.is_none() && options.delimiter.is_none() {
+    if options.columns.is_none() && options.delimiter.is_none() && options.rows.is_empty() {
         return Ok(());
     }
     Err(Error::Unsupported {
         path: path.to_owned(),
         what: Diagnostic::new(format!(
-            "{COLUMNS} and {DELIMITER} are for tables of text, and this is {}",
+            "{COLUMNS}, {DELIMITER} and {WHERE} are for tables of text, and this is {}",
             format.name()
         ))
         .help(format!("{FIELD} says where values lie in messages")),

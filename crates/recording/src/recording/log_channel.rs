@@ -27,6 +27,8 @@ pub struct LogChannel {
     pub(super) read_as: Option<PayloadType>,
     /// Whether these are the attitudes of a sensor of a text whose samples are another channel.
     pub is_derived: bool,
+    /// Name of the columns that tell it from other sensors of its table.
+    pub(super) sensor_column: Option<String>,
 }
 
 impl LogChannel {
@@ -40,6 +42,7 @@ impl LogChannel {
             messages: Some(self.messages),
             rank: self.rank(),
             is_derived: self.is_derived,
+            sensor_column: self.sensor_column.clone(),
         }
     }
 
@@ -168,6 +171,7 @@ pub fn known(
         stated: None,
         read_as: None,
         is_derived: false,
+        sensor_column: None,
     }
 }
 

@@ -142,6 +142,7 @@ impl Recording {
             messages: (!is_shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
             rank: self.channels_of(source).map(rank_of).max().unwrap_or(0),
             is_derived: first.is_some_and(|known| known.is_derived),
+            sensor_column: first.and_then(|known| known.sensor_column.clone()),
         }
     }
 }

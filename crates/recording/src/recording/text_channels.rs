@@ -9,6 +9,7 @@ use super::log_channel::LogChannel;
 use super::payload_type::PayloadType;
 use crate::attitude_line::TRUTH_ID;
 use crate::decode::{Class, Line, Options, Rank, Role, Stated};
+use crate::delimited::Table;
 use crate::lines::Lines;
 use crate::mcap::{Channel, ChannelSurvey, Schema};
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,7 @@ pub(super) struct TextChannels {
     /// Type of the payloads, with how a table is read.
     read_as: PayloadType,
     is_table: bool,
+    sensor_column: Option<String>,
     stated: Stated,
     /// Sensors in the order of appearance.
     met: Vec<Met>,
@@ -46,6 +48,7 @@ impl TextChannels {
         let read_as = described(lines);
         TextChannels {
             is_table: lines.format().is_table(),
+            sensor_column: lines.table().and_then(Table::sensor_column),
             stated: Stated {
                 declared: Declared {
                     interval_unit_given: options.states_interval_unit(),
@@ -161,6 +164,7 @@ impl TextChannels {
             stated: Some(met.stated.clone()),
             read_as: Some(self.read_as.clone()),
             is_derived: *is_attitude && is_sampled,
+            sensor_column: self.sensor_column.clone(),
         }
     }
 

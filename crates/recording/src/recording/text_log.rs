@@ -12,6 +12,7 @@ use super::line_reader::{LineEvent, MOST_SENSORS, Sensors, read};
 use super::log_channel::LogChannel;
 use super::sample_cache::{CacheWriter, SampleCache};
 use super::text_channels::TextChannels;
+use crate::columns::RowSelection;
 use crate::decode::Options;
 use crate::delimited::Table;
 use crate::error::{Error, Result};
@@ -52,7 +53,7 @@ impl TextLog {
     ) -> Result<(TextLog, Vec<LogChannel>)> {
         let mut lines = input.lines(options)?;
         let mut met = TextChannels::of(&lines, options);
-        let notes = (lines.notes(), doubt_of_unit(&lines));
+        let mut notes = (lines.notes(), doubt_of_unit(&lines));
         let mut cache = CacheWriter::new(kept);
         let take = |event: LineEvent<'_, Bytes>| -> Result<_> {
             match &event {
@@ -68,6 +69,11 @@ impl TextLog {
             sensors.check_nanos(input.name(), lines.format())?;
         }
         let channels = met.channels();
+        let selection = lines.selection();
+        notes.0.extend(selection.and_then(RowSelection::note));
+        if let Some(why) = selection.and_then(RowSelection::nothing) {
+            return Err(Error::unsupported(input.name(), why));
+        }
         if channels.is_empty() {
             let or_else = " or an orientation";
             return Err(no_rates(input.name(), input.format(), or_else));
@@ -141,7 +147,7 @@ impl TextLog {
 
 /// Reads lines that come once, to their end or until `take` has enough. `select` says the way of a channel's samples when
 /// it is met; `take` gets their items, to be taken out of the vector, and whether the next line may be long in coming.
-/// The channels that were met.
+/// Returns the channels that were met, and a note about rows that were left out.
 ///
 /// # Errors
 /// They cannot be read, or carry no rate; as `take`.
@@ -150,7 +156,7 @@ pub fn walk_once<R: Read, E: From<Error>>(
     (path, options): (&Path, &Options),
     mut select: impl FnMut(&LogChannel) -> Option<Route>,
     mut take: impl FnMut(&mut Vec<Item>, bool) -> std::result::Result<ControlFlow<()>, E>,
-) -> std::result::Result<Vec<LogChannel>, E> {
+) -> std::result::Result<(Vec<LogChannel>, Option<String>), E> {
     let format = lines.format();
     let is_judged = are_judged(&lines, options);
     let mut met = TextChannels::of(&lines, options);
@@ -167,7 +173,8 @@ pub fn walk_once<R: Read, E: From<Error>>(
             }
             LineEvent::Samples(place, samples) => met.take(*place, samples),
             LineEvent::LineOver(lines, sensors) => {
-                if lines.number() > PATIENCE && !has_rates {
+                let left_out = lines.selection().map_or(0, RowSelection::left_out);
+                if lines.number().saturating_sub(left_out) > PATIENCE && !has_rates {
                     return Err(no_rates(path, format, "").into());
                 }
                 if is_judged && out.steps(sensors) == STEPS {
@@ -186,6 +193,10 @@ pub fn walk_once<R: Read, E: From<Error>>(
         Ok(ControlFlow::Continue(()))
     };
     let sensors = read(&mut lines, path, of_line)?;
+    let selection = lines.selection();
+    if let Some(why) = selection.and_then(RowSelection::nothing) {
+        return Err(Error::unsupported(path, why).into());
+    }
     if !has_rates {
         return Err(no_rates(path, format, "").into());
     }
@@ -195,7 +206,7 @@ pub fn walk_once<R: Read, E: From<Error>>(
     if !is_enough {
         let _ = take(&mut out.items, false)?;
     }
-    Ok(met.channels())
+    Ok((met.channels(), selection.and_then(RowSelection::note)))
 }
 
 /// Why the unit of the rates may be another one than it is taken for.

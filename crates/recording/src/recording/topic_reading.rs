@@ -25,7 +25,7 @@ pub struct TopicReading<'l> {
     log: &'l Recording,
     plan: TopicPlan<'l>,
     /// Something to know about the choice.
-    pub note: Option<String>,
+    pub note: Option<Diagnostic>,
     /// Topics that belong to these samples.
     besides: AuxiliaryInputs,
 }
@@ -76,6 +76,14 @@ impl<'l> TopicReading<'l> {
             note: None,
             besides: AuxiliaryInputs::default(),
         })
+    }
+
+    /// Says what else was there, to whom the recording was opened with.
+    pub fn say_note(&self) {
+        if let Some(note) = &self.note {
+            let said = format!("{}: {note}", self.log.name().display());
+            self.log.input().warn().say(&said);
+        }
     }
 
     /// Returns the plan by which it is read.

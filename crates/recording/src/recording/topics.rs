@@ -25,6 +25,8 @@ pub struct Candidate {
     pub rank: u8,
     /// Whether these are attitudes of a sensor whose samples are another topic: no other sensor.
     pub is_derived: bool,
+    /// Name of the columns that tell the sensors of a table apart, where it is one of a table.
+    pub sensor_column: Option<String>,
 }
 
 /// A rank from which a topic is picked without being named.
@@ -40,7 +42,7 @@ pub struct Choice {
     /// Topics in order of appearance.
     pub topics: Vec<String>,
     /// A note for the user, when something else was there too.
-    pub note: Option<String>,
+    pub note: Option<Diagnostic>,
 }
 
 /// Chooses. `named` is `--topic`.
@@ -106,6 +108,9 @@ fn the_best(path: &Path, candidates: &[Candidate], best: u8) -> Result<Choice> {
     if topics.len() > 1 {
         let these = candidates.iter().filter(|c| c.rank == best);
         let these: Vec<Candidate> = these.cloned().collect();
+        if let Some(choice) = first_of_table(&these) {
+            return Ok(choice);
+        }
         return Err(Error::SeveralImuTopics {
             path: path.to_owned(),
             topics: listing(&these),
@@ -118,13 +123,46 @@ fn the_best(path: &Path, candidates: &[Candidate], best: u8) -> Result<Choice> {
     let mut others = imus(candidates, PICKED_UNNAMED);
     others.retain(|name| !is_own(name));
     let note = (!others.is_empty()).then(|| {
-        format!(
+        Diagnostic::new(format!(
             "took {}; {} could be taken too with {TOPIC}",
             named_few(&topics),
             named_few(&others)
-        )
+        ))
     });
     Ok(Choice { topics, note })
+}
+
+/// Chooses the first sensor of one table: its rows name whose they are, and nothing is mixed. The others are named.
+fn first_of_table(sensors: &[Candidate]) -> Option<Choice> {
+    let (first, others) = sensors.split_first()?;
+    let column = first.sensor_column.as_ref()?;
+    if others
+        .iter()
+        .any(|other| other.sensor_column.as_ref() != Some(column))
+    {
+        return None;
+    }
+    let counted = |sensor: &Candidate| match sensor.messages {
+        Some(count) => format!("{} ({count} samples)", sensor.topic),
+        None => sensor.topic.clone(),
+    };
+    let named: Vec<String> = others.iter().map(counted).collect();
+    let other = match others {
+        [one] => one.topic.as_str(),
+        _ => "NAME",
+    };
+    let note = Diagnostic::new(format!(
+        "{} sensors are in this table, by its column {column}: took the first, {}, and left out {}",
+        sensors.len(),
+        counted(first),
+        named_few(&named)
+    ))
+    .help(format!("{TOPIC} {other} takes another, {TOPIC} all each"))
+    .coded("several-topics");
+    Some(Choice {
+        topics: vec![first.topic.clone()],
+        note: Some(note),
+    })
 }
 
 /// One indented line per channel, at most 40.
@@ -164,6 +202,7 @@ mod tests {
             messages: Some(3),
             rank,
             is_derived: false,
+            sensor_column: None,
         }
     }
 
@@ -198,6 +237,28 @@ mod tests {
     }
 
     #[test]
+    fn of_the_sensors_of_one_table_the_first_is_taken_and_the_others_are_named() {
+        let of_table = |topic: &str| Candidate {
+            sensor_column: Some("device".to_owned()),
+            ..candidate(topic, 5)
+        };
+        let all = [of_table("left"), of_table("right")];
+        let choice = chosen(&all, None).unwrap();
+        assert_eq!(choice.topics, ["left"]);
+        let note = choice.note.unwrap().to_string();
+        for part in [
+            "column device",
+            "left out right (3 samples)",
+            "topic right",
+            "topic all",
+        ] {
+            assert!(note.contains(part), "{note}");
+        }
+        assert_eq!(chosen(&all, Some("right")).unwrap().topics, ["right"]);
+        assert!(chosen(&[of_table("left"), candidate("/imu", 5)], None).is_err());
+    }
+
+    #[test]
     fn a_better_ranked_topic_is_taken_and_the_other_is_said() {
         let all = [
             candidate("/vehicle_imu", 3),
@@ -205,7 +266,8 @@ mod tests {
         ];
         let choice = chosen(&all, None).unwrap();
         assert_eq!(choice.topics, ["/sensor_combined"]);
-        assert!(choice.note.unwrap().contains("/vehicle_imu"));
+        let note = choice.note.unwrap().to_string();
+        assert!(note.contains("/vehicle_imu"));
     }
 
     #[test]

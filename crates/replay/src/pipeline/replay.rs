@@ -100,7 +100,7 @@ fn file(
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let Some(first) = chosen.first_mut() {
         let warnings = &mut first.found.warnings;
-        warnings.extend(choice.note.map(Diagnostic::from));
+        warnings.extend(choice.note);
         let notes = log.notes(run.plan.unit.is_some());
         warnings.extend(notes.cloned().map(Diagnostic::from));
         let made_before = log.made_before().filter(|_| named.is_none());

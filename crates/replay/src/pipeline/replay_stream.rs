@@ -11,7 +11,7 @@ use super::stream_topic::StreamTopic;
 use super::summarise;
 use crate::error::{Error, Result};
 use crate::sink::Flow;
-use crate::summary::RunSummary;
+use crate::summary::{RunSummary, warning};
 use std::cell::RefCell;
 use std::io::Read;
 use std::ops::ControlFlow;
@@ -90,7 +90,7 @@ pub(super) fn replay_lines(
     let notes = notes.chain(made_before.as_ref().map(integrated_again));
     let topic = RefCell::new(StreamTopic::of(run, &path, notes.collect()));
     let mut start = StreamStart::new(run, &path);
-    let channels = walk_once::<_, Error>(
+    let (channels, left_out) = walk_once::<_, Error>(
         lines,
         (&path, &run.decode_options()),
         |known| topic.borrow_mut().route(known),
@@ -106,7 +106,11 @@ pub(super) fn replay_lines(
     if start.is_idle() {
         return Err(topic.nothing(&channels, &[]));
     }
-    finish((run, topic), start, &Survey::default(), pool)
+    let mut summary = finish((run, topic), start, &Survey::default(), pool)?;
+    if let (Some(first), Some(note)) = (summary.topics.first_mut(), left_out) {
+        first.findings.push(warning(&Diagnostic::from(note)));
+    }
+    Ok(summary)
 }
 
 /// Takes the next items of a stream.
