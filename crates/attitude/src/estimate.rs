@@ -14,6 +14,7 @@ mod aiding;
 mod anew;
 mod calibrated;
 mod class_pass;
+mod clock_choice;
 mod clock_pass;
 mod estimator;
 mod first_pass;

@@ -27,7 +27,8 @@ impl SpikePolicy {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum StampRepair {
     /// Stamps go on where their counter wraps, and where their clock was set while that of the recorder went on; those
-    /// of batches are spread; those that stand still give way to the log time.
+    /// of batches and of coarse clocks are spread; those that stand still, or by which gravity does not, give way to the
+    /// log time.
     #[default]
     Auto,
     /// Stamps as recorded.

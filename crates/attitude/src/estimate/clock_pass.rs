@@ -3,6 +3,8 @@
 //! Apart from the preparation because it is one of its passes, and what `check` looks with: at stamps, arrivals and rates
 //! as they were recorded.
 
+use super::clock_choice;
+use super::meaning::Meaning;
 use super::plan::EstimationSettings;
 use crate::condition::{
     BatchRate, Batches, Clock, ClockSpeed, CoarseClock, Sharing, SpeedPass, SpeedVerdict,
@@ -77,6 +79,8 @@ fn shared(samples: &[RawSample], clock: Clock) -> Sharing {
 /// Verdict of a [`ClockPass`].
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct ClockVerdict {
+    /// The clock to use.
+    pub clock: Clock,
     /// The rate of samples that were stamped when their batch came.
     pub batches: Option<BatchRate>,
     /// The clock, where it is coarser than the sensor.
@@ -123,22 +127,42 @@ impl ClockPass {
         }
     }
 
-    /// Judges the samples that were taken, on `clock`.
+    /// Whether the samples so far share too few stamps for a coarse clock to be told.
     #[must_use]
-    pub fn finish(self, clock: Clock) -> ClockVerdict {
-        let coarse = match shared(&self.samples, clock) {
-            Sharing::None if self.is_stream => return ClockVerdict::default(),
-            Sharing::None => None,
-            Sharing::Coarse(found) => Some(Some(found)),
-            Sharing::Repeats => Some(None),
-        };
-        if let Some(coarse) = coarse {
-            let of_speed = match self.is_stream {
-                true => None,
-                false => self.of_speed(clock),
-            };
+    pub fn lacks_stamps(&self) -> bool {
+        self.shared.want_more()
+    }
+
+    /// Returns the samples by which a clock is chosen: the `first`, or all that were taken where the first share one stamp.
+    #[must_use]
+    pub(super) fn prefix<'a>(&'a self, first: &'a [RawSample]) -> &'a [RawSample] {
+        let is_one = |pair: &[RawSample]| matches!(pair, [a, b] if a.header == b.header);
+        let is_stuck = first.len() > 1 && first.windows(2).all(is_one);
+        match is_stuck && self.samples.len() > first.len() {
+            true => &self.samples,
+            false => first,
+        }
+    }
+
+    /// Judges the samples that were taken, on `clock`, understood as in the run.
+    #[must_use]
+    pub fn finish(self, clock: Clock, of: (&EstimationSettings, &Meaning)) -> ClockVerdict {
+        if self.is_stream {
             return ClockVerdict {
-                coarse,
+                clock,
+                coarse: coarse_clock(&self.samples, clock, StampRepair::Auto),
+                ..ClockVerdict::default()
+            };
+        }
+        let (clock, of_speed) = self.by_speed(clock, of);
+        let shared = shared(&self.samples, clock);
+        if shared != Sharing::None {
+            return ClockVerdict {
+                clock,
+                coarse: match shared {
+                    Sharing::Coarse(found) => Some(found),
+                    Sharing::Repeats | Sharing::None => None,
+                },
                 of_speed,
                 ..ClockVerdict::default()
             };
@@ -155,14 +179,28 @@ impl ClockPass {
         ClockVerdict {
             batches: rate,
             of_batches,
+            clock,
             coarse: None,
-            of_speed: self.of_speed(clock),
+            of_speed,
         }
     }
 
-    fn of_speed(&self, clock: Clock) -> Option<Diagnostic> {
-        let found = self.speed(clock).filter(is_wrong)?;
-        Some(of_speed(&found))
+    /// The clock to use, where that of the stamps runs at another speed than the recorder's, and what to say of it: the
+    /// recorder's where gravity stands still by it.
+    fn by_speed(
+        &self,
+        clock: Clock,
+        of: (&EstimationSettings, &Meaning),
+    ) -> (Clock, Option<Diagnostic>) {
+        let Some(found) = self.speed(clock).filter(is_wrong) else {
+            return (clock, None);
+        };
+        let told = clock_choice::for_arrival(&self.samples, of, found.speed);
+        let clock = match told {
+            Some(log) if log > clock_choice::CLEAR => Clock::Log,
+            _ => clock,
+        };
+        (clock, Some(of_speed(&found, told)))
     }
 
     fn speed(&self, clock: Clock) -> Option<ClockSpeed> {
@@ -209,24 +247,44 @@ fn unsure(rate: &BatchRate) -> Diagnostic {
     .coded("batches")
 }
 
-fn of_speed(found: &ClockSpeed) -> Diagnostic {
+/// Message about two clocks; `told` is the logarithm of how many times likelier the recorder's is.
+fn of_speed(found: &ClockSpeed, told: Option<f64>) -> Diagnostic {
     let (stamps, log) = found.steps_secs;
-    Diagnostic::new(format!(
+    let what = format!(
         "header stamps advance {:.3} s in a second of the recorder's clock: {:.2} Hz by the one, {:.2} Hz by the other",
         found.speed,
         1.0 / stamps.max(1e-9),
         1.0 / log.max(1e-9)
-    ))
-    .help(format!(
-        "{TIME} log if the recorder's clock is right: every angle is wrong by the ratio otherwise"
-    ))
-    .coded("clock-speed")
+    );
+    let (why, help) = match told {
+        Some(log) if log > clock_choice::CLEAR => (
+            format!(
+                "; gravity stands still by the recorder's (e^{log:.0} times likelier): using the log time"
+            ),
+            format!("{TIME} log makes this explicit, {STAMPS} as-recorded keeps the stamps"),
+        ),
+        Some(log) if log < -clock_choice::CLEAR => (
+            format!(
+                "; gravity stands still by the stamps (e^{:.0} times likelier), which are used",
+                -log
+            ),
+            format!("{STAMPS} as-recorded if that is known"),
+        ),
+        _ => (
+            String::new(),
+            format!(
+                "{TIME} log if the recorder's clock is right: every angle is wrong by the ratio otherwise"
+            ),
+        ),
+    };
+    Diagnostic::new(what + &why).help(help).coded("clock-speed")
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::record::Declared;
 
     fn verdict(header: impl Fn(i64) -> i64) -> ClockVerdict {
         let mut pass = ClockPass::of(&EstimationSettings::default()).unwrap();
@@ -239,7 +297,9 @@ mod tests {
                 ..RawSample::default()
             });
         }
-        pass.finish(Clock::Header)
+        let plan = EstimationSettings::default();
+        let meaning = Meaning::new(&plan, &Declared::default());
+        pass.finish(Clock::Header, (&plan, &meaning))
     }
 
     #[test]

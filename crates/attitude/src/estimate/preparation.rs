@@ -261,7 +261,8 @@ impl Preparation {
             ..
         } = self;
         let mut warnings = Vec::new();
-        let (clock, clocks) = decide_clock((&plan, &resolved), &first, clocks, &mut warnings)?;
+        let clocks = decide_clock((&plan, &resolved), &first, clocks, &mut warnings)?;
+        let clock = clocks.clock;
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         // The method of a daemon decides as a daemon: by the first sample.
         let (looked_at, is_beside) = match plan.method {

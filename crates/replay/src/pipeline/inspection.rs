@@ -112,7 +112,8 @@ impl TopicInspector {
             return Ok(());
         }
         self.first.push(*raw);
-        if self.first.len() >= FEW {
+        let clocks = self.clocks.as_ref();
+        if self.first.len() >= FEW && !clocks.is_some_and(ClockPass::lacks_stamps) {
             self.settle();
         }
         Ok(())
@@ -142,6 +143,9 @@ impl TopicInspector {
         counts.add_many(Verdict::Undecodable, self.undecodable);
         let mut quality = self.quality.summary();
         quality.lines = Some(self.stamps.finish());
+        let of = (&self.plan, &self.resolved);
+        let clocks = self.clocks.map(|pass| pass.finish(clock, of));
+        let clocks = clocks.unwrap_or_default();
         Ok(Inspection {
             topic: self.topic,
             of: self.of,
@@ -155,10 +159,7 @@ impl TopicInspector {
             rests,
             counts,
             clock_set: self.conditioned.clock_set(),
-            clocks: self
-                .clocks
-                .map(|pass| pass.finish(clock))
-                .unwrap_or_default(),
+            clocks,
             undecodable: self.undecodable,
             clock,
             clock_warning,

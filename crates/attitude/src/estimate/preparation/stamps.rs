@@ -4,7 +4,7 @@
 //! Apart from the rest of the preparation because nothing else of it looks at clocks.
 
 use super::Patience;
-use crate::condition::{Clock, ClockWarning, choose_clock_as};
+use crate::condition::{ClockWarning, choose_clock_as};
 use crate::diagnostic::Diagnostic;
 use crate::estimate::clock_pass::{ClockPass, ClockVerdict};
 use crate::estimate::intervals::Mismatch;
@@ -20,22 +20,28 @@ pub(super) fn decide_clock(
     first: &[RawSample],
     clocks: Option<ClockPass>,
     warnings: &mut Vec<Diagnostic>,
-) -> Result<(Clock, ClockVerdict), Diagnostic> {
-    let (clock, warning) = choose_clock_as(first, plan.clock, plan.stamps);
+) -> Result<ClockVerdict, Diagnostic> {
+    let prefix = clocks.as_ref().map_or(first, |pass| pass.prefix(first));
+    let (clock, warning) = choose_clock_as(prefix, plan.clock, plan.stamps);
     if let Some(fatal @ ClockWarning::NoneMoves) = warning {
         return Err(Diagnostic::from(&fatal));
     }
     warnings.extend(warning.iter().map(Diagnostic::from));
-    let mut clocks = clocks.map(|pass| pass.finish(clock)).unwrap_or_default();
+    let unjudged = || ClockVerdict {
+        clock,
+        ..ClockVerdict::default()
+    };
+    let of = (plan, resolved);
+    let mut clocks = clocks.map_or_else(unjudged, |pass| pass.finish(clock, of));
     warnings.extend(clocks.of_batches.take());
     warnings.extend(clocks.of_speed.take());
-    if let Some(mismatch) = Mismatch::between(first, clock, resolved.kind) {
+    if let Some(mismatch) = Mismatch::between(first, clocks.clock, resolved.kind) {
         if !resolved.interval_unit_given {
             return Err(mismatch.refusal(resolved.interval.as_ref()));
         }
         warnings.push(format!("{mismatch}: what lies between is bridged").into());
     }
-    Ok((clock, clocks))
+    Ok(clocks)
 }
 
 /// Decides how stamps are made regular, where that was asked for.

@@ -84,7 +84,7 @@ pub static ROWS: [Row; 36] = [
     Row {
         setting: STAMPS,
         meaning: "Stamps that are not those of an even clock: auto (mended where the data prove it), as-recorded",
-        effect: "auto: stamps go on where a counter wraps, and where their clock was set while the recorder's went on; batches that were stamped when they came are spread evenly (files); a clock that stands still gives way to the log time. What is done is reported; other recordings are the same with both.",
+        effect: "auto: stamps go on where a counter wraps, and where their clock was set while the recorder's went on; batches that were stamped when they came are spread evenly (files); rows that are alike on a clock coarser than the sensor are no repeats; a clock that stands still, or by which gravity does not, gives way to the log time. What is done is reported; other recordings are the same with both.",
         default: Default::Value("auto"),
         environment: Some("STRAPD_STAMPS"),
         placeholder: "STAMPS",
