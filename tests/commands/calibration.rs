@@ -1,5 +1,6 @@
 //! Promise: what was learned of a sensor is its errors, is found again in another log of it, and is of its own axes.
 
+mod iron;
 mod several;
 mod text;
 

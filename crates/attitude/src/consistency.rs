@@ -15,6 +15,7 @@
 
 mod bank;
 mod blocks;
+mod field;
 mod refine;
 mod segment;
 #[cfg(test)]
@@ -22,6 +23,7 @@ mod tests;
 
 use self::bank::{Answer, BANK, Evidence, Verdict};
 use self::blocks::{Block, Blocks, Rest, Step};
+pub use self::field::{FieldConsistency, FieldDisagreement, FieldIron, FieldReading};
 use self::refine::refine;
 use self::segment::{SEGMENT_SECS, Segment};
 use crate::frames::AxisMap;

@@ -9,6 +9,7 @@ use super::preparation::Prepared;
 use super::sensor_calibration::{CalibrationTerm, SensorCalibration};
 use super::smoothing::Recording;
 use crate::aid::{Filter, Prior, Settings};
+use crate::consistency::FieldIron;
 use crate::smooth::{Estimated, OBSERVED, PriorSigmas, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
@@ -197,7 +198,10 @@ pub fn learned(
             observed: [true],
         });
     }
-    if let Some(Recording { smoothed, .. }) = recording {
+    if let Some(Recording { smoothed, iron, .. }) = recording {
+        if let Some(iron) = iron {
+            take_up(&mut known, resolved, iron);
+        }
         let class = [prepared.noise.bias_of_class(); 3];
         by_smoother(
             &mut known,
@@ -271,6 +275,35 @@ pub fn learned(
         0.0,
     ));
     known
+}
+
+/// Adds iron that was taken out of the fields before they were smoothed, body axes: the smoother's is of what is left.
+fn take_up(known: &mut SensorCalibration, resolved: &Meaning, iron: &FieldIron) {
+    let to_body = resolved.field_to_body();
+    let before = known.field_matrix();
+    let from_body = (to_body * before)
+        .try_inverse()
+        .unwrap_or_else(Matrix3::identity);
+    // Squares turn with the squares of the axes, as of errors that are independent.
+    let square = |matrix: &Matrix3<f64>| matrix.component_mul(matrix);
+    let offset = Vector3::from(vector_of(known.hard_iron.as_ref())) + from_body * iron.offset;
+    let offset_sigma = square(&from_body) * square_of(&iron.offset_sigma);
+    known.hard_iron = Some(CalibrationTerm {
+        value: offset.into(),
+        sigma: Some(offset_sigma.map(f64::sqrt).into()),
+        observed: [true; 3],
+    });
+    let matrix = to_body.transpose() * iron.matrix * to_body * before - Matrix3::identity();
+    let sigma = square(&to_body).transpose() * square(&iron.matrix_sigma) * square(&to_body);
+    known.soft_iron = Some(CalibrationTerm {
+        value: row_by_row(&matrix),
+        sigma: Some(row_by_row(&sigma.map(f64::sqrt))),
+        observed: [true; 9],
+    });
+}
+
+fn square_of(sigma: &Vector3<f64>) -> Vector3<f64> {
+    sigma.component_mul(sigma)
 }
 
 /// Calibration that a whole recording gives. `class`: one sigma of the bias where the recording tells nothing of it.

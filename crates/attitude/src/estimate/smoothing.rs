@@ -5,11 +5,14 @@
 
 use super::kept::{Event, SampleStore, Spool, SpoolError};
 use crate::aid::{AidedPropagator, VectorPairing};
+use crate::consistency::{FieldConsistency, FieldIron, FieldReading};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Executor;
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
-use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
+use crate::record::{
+    AttitudeCovariance, AttitudeSample, Join, Nanos, RateSample, SampleKind, Status,
+};
 use crate::smooth::{
     Estimate, Estimated, FORCE_SCALE, FieldUnit, Outcome, PriorScale, PriorSigmas, Sample,
     SampleModel, Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
@@ -60,6 +63,8 @@ pub(super) struct Smoothing {
     /// The first steps, ns, and the last stamp.
     steps: Vec<i64>,
     last: Option<Nanos>,
+    /// Gyro held against the field, for iron beyond what a smoother's priors allow.
+    fields: (VectorPairing, FieldConsistency),
     told: SmoothingInputs,
     /// Once the end has come; in words why there is none.
     result: Option<Result<Recording, Diagnostic>>,
@@ -77,7 +82,9 @@ pub struct Recording {
     pub is_beyond_class: bool,
     /// Bytes of it that were kept in a temporary file.
     pub spooled_bytes: u64,
-    /// Sizes of forces at rest and of fields, as measured and as calibrated.
+    /// Iron beyond that of a calibrated sensor: taken out of the fields before they were smoothed.
+    pub iron: Option<FieldIron>,
+    /// Sizes of forces at rest and of fields, as measured (less that iron) and as calibrated.
     pub sizes: Vec<Sizes>,
 }
 
@@ -127,6 +134,7 @@ fn is_off<const N: usize>(learned: &Estimated<N>) -> bool {
 /// Kept samples, as the smoother reads them.
 struct Reading<'a> {
     kept: &'a mut SampleStore,
+    iron: Option<FieldIron>,
     has_forces_beside: bool,
     /// Rates whose attitudes have not come yet, where they are wanted.
     waiting: Option<&'a RefCell<VecDeque<RateSample>>>,
@@ -140,6 +148,7 @@ impl Samples for Reading<'_> {
         let mut fields = VectorPairing::with_repeats();
         let (mut last, mut shift): (Option<Nanos>, i64) = (None, 0);
         let mut chunk = Vec::with_capacity(CHUNK);
+        let iron = self.iron;
         self.kept.give(|event| match event {
             Event::ForcesBeside => {
                 forces.get_or_insert_default();
@@ -149,7 +158,10 @@ impl Samples for Reading<'_> {
                     forces.take(stamp, *force.as_vector());
                 }
             }
-            Event::Field(stamp, field) => fields.take(stamp, *field.as_vector()),
+            Event::Field(stamp, field) => {
+                let measured = field.as_vector();
+                fields.take(stamp, iron.map_or(*measured, |iron| iron.undone(measured)));
+            }
             Event::Rate(rate) => {
                 let turning = rate.mean_rate();
                 if let Some(last) = last.filter(|last| *last >= rate.stamp) {
@@ -193,6 +205,7 @@ impl Smoothing {
             kept: SampleStore::default(),
             steps: Vec::new(),
             last: None,
+            fields: (VectorPairing::with_repeats(), FieldConsistency::default()),
             told,
             result: None,
         }
@@ -225,6 +238,7 @@ impl Smoothing {
 
     pub(super) fn take_field(&mut self, stamp: Nanos, field: In<Body>) {
         self.kept.push(&Event::Field(stamp, field));
+        self.fields.0.take(stamp, *field.as_vector());
         self.aided.take_field(stamp, field);
     }
 
@@ -232,6 +246,7 @@ impl Smoothing {
     pub(super) fn push(&mut self, rates: &[RateSample], scratch: &mut Vec<AttitudeSample>) {
         for rate in rates {
             self.kept.push(&Event::Rate(*rate));
+            self.watch_field(rate);
             if let Some(last) = self.last.replace(rate.stamp)
                 && self.steps.len() < FEW
             {
@@ -240,6 +255,20 @@ impl Smoothing {
         }
         self.aided.push(rates, scratch);
         scratch.clear();
+    }
+
+    /// Holds the gyro against the field that belongs to the sample.
+    fn watch_field(&mut self, rate: &RateSample) {
+        let (pairing, consistency) = &mut self.fields;
+        if matches!(rate.join, Join::Hold | Join::Reset) {
+            consistency.interrupt();
+        }
+        consistency.push(&FieldReading {
+            stamp: rate.stamp,
+            gyro: rate.gyro,
+            field: pairing.at(rate.stamp, &rate.mean_rate().0),
+            force: rate.accel.map(|force| *force.as_vector()),
+        });
     }
 
     /// The recording has ended: gives all its attitudes, in pieces.
@@ -254,13 +283,14 @@ impl Smoothing {
     ) -> Result<(), SpoolError> {
         self.aided.finish(out);
         out.clear();
-        let mut result = match self.smooth(exec.threads()) {
+        let iron = self.fields.1.iron().filter(FieldIron::has_soft_iron);
+        let mut result = match self.smooth(exec.threads(), iron) {
             Err(SmoothError::Read(error)) => return Err(error),
             Err(other) => Err(Diagnostic::from(&other)),
             Ok(result) => result,
         };
         match &mut result {
-            Ok(recording) => recording.sizes = self.write(&recording.smoothed, out, give)?,
+            Ok(recording) => recording.sizes = self.write(recording, out, give)?,
             Err(_) => self.filter_again(out, give)?,
         }
         self.result = Some(result);
@@ -292,8 +322,9 @@ impl Smoothing {
         Ok(())
     }
 
-    fn reading(&mut self) -> Reading<'_> {
+    fn reading(&mut self, iron: Option<FieldIron>) -> Reading<'_> {
         Reading {
+            iron,
             has_forces_beside: self.fresh.has_forces_beside(),
             kept: &mut self.kept,
             waiting: None,
@@ -314,6 +345,7 @@ impl Smoothing {
     fn smooth(
         &mut self,
         threads: usize,
+        iron: Option<FieldIron>,
     ) -> Result<Result<Recording, Diagnostic>, SmoothError<SpoolError>> {
         let is_taken_as_mean = self.told.kind == SampleKind::Rate
             && !self.told.is_kind_stated
@@ -322,19 +354,23 @@ impl Smoothing {
             SampleKind::Rate if !is_taken_as_mean => SampleModel::Instant,
             _ => SampleModel::Interval,
         };
+        let mut known = self.told.known;
+        if let Some(iron) = &iron {
+            known.field = std::array::from_fn(|n| Some(iron.matrix_sigma[(n / 3, n % 3)]));
+        }
         let settings = Settings {
             sample_model,
             field_unit: FieldUnit::Unknown,
             bias_sigma: self.told.bias_sigma,
             gyro_range: self.told.gyro_range,
             looseness: self.told.looseness,
-            known: self.told.known,
+            known,
             // What a driver cut off is put back before, where it is.
             undo_truncation: false,
             threads: NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN),
             ..Settings::default()
         };
-        let smoothed = match self.smooth_by(&settings)? {
+        let smoothed = match self.smooth_by(&settings, iron)? {
             Ok(smoothed) => smoothed,
             Err(why) => return Ok(Err(why)),
         };
@@ -345,7 +381,7 @@ impl Smoothing {
         };
         let again = if is_beyond(&smoothed, settings.looseness) {
             // Priors that lead nowhere are none to prefer.
-            self.smooth_by(&looser)?.ok()
+            self.smooth_by(&looser, iron)?.ok()
         } else {
             None
         };
@@ -354,6 +390,7 @@ impl Smoothing {
             smoothed: again.unwrap_or(smoothed),
             is_taken_as_mean,
             spooled_bytes: self.kept.spooled_bytes(),
+            iron,
             sizes: Vec::new(),
         }))
     }
@@ -361,8 +398,9 @@ impl Smoothing {
     fn smooth_by(
         &mut self,
         settings: &Settings,
+        iron: Option<FieldIron>,
     ) -> Result<Result<Smoothed, Diagnostic>, SmoothError<SpoolError>> {
-        let smoothed = smooth(&mut self.reading(), settings)?;
+        let smoothed = smooth(&mut self.reading(iron), settings)?;
         Ok(match smoothed.outcome() {
             // As it is without a smoother: nothing that runs along for its sake is better.
             Outcome::Filter(why) => Err(format!("it did not converge ({why})").into()),
@@ -372,7 +410,7 @@ impl Smoothing {
 
     fn write(
         &mut self,
-        smoothed: &Smoothed,
+        Recording { smoothed, iron, .. }: &Recording,
         out: &mut Vec<AttitudeSample>,
         give: &mut dyn FnMut(&mut [AttitudeSample]),
     ) -> Result<Vec<Sizes>, SpoolError> {
@@ -380,7 +418,7 @@ impl Smoothing {
         let waiting = RefCell::new(VecDeque::new());
         let mut reading = Reading {
             waiting: Some(&waiting),
-            ..self.reading()
+            ..self.reading(*iron)
         };
         let mut turn: Option<Quaternion<Nav, Nav>> = None;
         let (mut section, mut last): (usize, Option<Quaternion<Nav, Body>>) = (0, None);
@@ -434,7 +472,7 @@ mod tests {
     use super::*;
     use crate::aid::{self, Start};
     use crate::propagate::{self, Sequential};
-    use crate::record::{Join, Measured};
+    use crate::record::Measured;
     use crate::smooth::BIAS_SIGMA;
     use std::io::Cursor;
 

@@ -178,10 +178,26 @@ impl Calibrating {
                 "the accelerometer's lead: turn fast, to and fro, at 200 deg/s and more".to_owned(),
             );
         }
-        if self.has_magnetometer
-            && !(unknown(&known.hard_iron).is_empty() && unknown(&known.soft_iron).is_empty())
-        {
-            missing.push("the magnetometer: turn every way, away from iron".to_owned());
+        if self.has_magnetometer {
+            let hard = unknown(&known.hard_iron);
+            let axes: Vec<&str> = ["x", "y", "z"]
+                .into_iter()
+                .enumerate()
+                .filter(|(i, _)| hard.contains(i))
+                .map(|(_, axis)| axis)
+                .collect();
+            if !axes.is_empty() {
+                missing.push(format!(
+                    "the magnetometer's hard iron along {}: rotate it so that each of these axes points along the field and against it, away from iron",
+                    axes.join(" and ")
+                ));
+            }
+            if !unknown(&known.soft_iron).is_empty() {
+                missing.push(
+                    "the magnetometer's soft iron: none above 3 % shows; rotate it about every axis for two minutes, away from iron"
+                        .to_owned(),
+                );
+            }
         }
         missing
     }
