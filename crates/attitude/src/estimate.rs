@@ -22,6 +22,7 @@ mod gyro_watch;
 mod integrator;
 mod intervals;
 mod kept;
+mod magnetometer_watch;
 mod meaning;
 mod noise_figures;
 mod plan;

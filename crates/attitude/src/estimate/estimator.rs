@@ -8,6 +8,7 @@ use super::anew::RestartRequest;
 use super::gyro_watch::GyroWatch;
 use super::integrator::{AuxiliaryVector, Integrator};
 use super::kept::{Spool, SpoolError};
+use super::magnetometer_watch::MagnetometerWatch;
 use super::meaning::Meaning;
 use super::plan::{EstimationSettings, Initial, Noise};
 use super::preparation::Prepared;
@@ -16,7 +17,7 @@ use super::smoothing::{Recording, Smoothing, SmoothingInputs};
 use crate::aid::{self, AidedPropagator};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
-use crate::consistency::Consistency;
+use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
@@ -42,6 +43,8 @@ pub struct Estimator {
     besides: Option<AuxiliaryInputs>,
     /// Watch over the gyro, where somebody wants it; it changes no attitude and is not remembered.
     watch: Option<GyroWatch>,
+    /// The same over the magnetometer.
+    magnetometer: Option<Box<MagnetometerWatch>>,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
     /// The next sample begins anew.
@@ -236,6 +239,7 @@ impl Estimator {
                 force_scale: None,
             }),
             watch: None,
+            magnetometer: None,
             begins_anew: false,
             rates: Vec::new(),
             even: Vec::new(),
@@ -377,6 +381,9 @@ impl Estimator {
     }
 
     fn take_field(&mut self, raw: &RawSample) {
+        if let Some(watch) = &mut self.magnetometer {
+            watch.take_field(raw, |stamp| self.conditioner.of_auxiliary(stamp));
+        }
         let Some(besides) = self.besides.as_ref().filter(|b| b.has_field) else {
             return;
         };
@@ -469,8 +476,13 @@ impl Estimator {
             self.rates
                 .extend_from_slice(rates.get(from..place).unwrap_or(&[]));
             self.push_rates(exec);
-            if let (Some(watch), AuxiliaryVector::Force(force)) = (&mut self.watch, &beside) {
-                watch.take_force(stamp, *force);
+            if let AuxiliaryVector::Force(force) = &beside {
+                if let Some(watch) = &mut self.watch {
+                    watch.take_force(stamp, *force);
+                }
+                if let Some(watch) = &mut self.magnetometer {
+                    watch.take_force(stamp, *force);
+                }
             }
             self.integrator.take_beside(stamp, beside);
             from = place;
@@ -482,6 +494,9 @@ impl Estimator {
 
     fn push_rates(&mut self, exec: &impl Executor) {
         if let Some(watch) = &mut self.watch {
+            watch.push(&self.rates);
+        }
+        if let Some(watch) = &mut self.magnetometer {
             watch.push(&self.rates);
         }
         let rates = match &mut self.regulariser {
@@ -501,16 +516,24 @@ impl Estimator {
         self.rates.clear();
     }
 
-    /// Holds the gyro against the accelerometer from now on, for [`Estimator::consistency`]; `resolved` is that by which
-    /// this was made.
-    pub fn watch_gyro(&mut self, resolved: &Meaning) {
+    /// Holds the gyro against accelerometer and magnetometer from now on, for [`Estimator::consistency`] and
+    /// [`Estimator::field_consistency`]; `resolved` and `prepared` are those by which this was made.
+    pub fn watch_sensors(&mut self, resolved: &Meaning, prepared: &Prepared) {
         self.watch = Some(GyroWatch::new(&resolved.to_body()));
+        let watch = MagnetometerWatch::new(resolved, prepared.clock);
+        self.magnetometer = Some(Box::new(watch));
     }
 
     /// Gyro against accelerometer as far as was seen; `None` where nobody asked to watch.
     #[must_use]
     pub fn consistency(&self) -> Option<&Consistency> {
         self.watch.as_ref().map(GyroWatch::consistency)
+    }
+
+    /// Gyro against magnetometer as far as was seen; `None` where nobody asked to watch.
+    #[must_use]
+    pub fn field_consistency(&self) -> Option<&FieldConsistency> {
+        Some(self.magnetometer.as_ref()?.consistency())
     }
 
     /// Report of conditioning.

@@ -116,6 +116,25 @@ pub fn choose(
     Ok(besides)
 }
 
+impl AuxiliaryInputs {
+    /// Adds the field that belongs to the samples of `own`, where nobody asks for it and it can be told: to be judged
+    /// beside them.
+    pub fn watch_field(
+        &mut self,
+        (plan, selection): (&EstimationSettings, &Selection),
+        log: &Recording,
+        (own, has_field): (&str, bool),
+    ) {
+        let is_asked = plan.aid == Aid::GravityAndField || selection.mag.is_some();
+        if is_asked || has_field {
+            return;
+        }
+        if let Ok(found) = unnamed(plan, log.name(), log, own) {
+            self.add(found);
+        }
+    }
+}
+
 /// Topics whose fields belong to the samples of `own`, if that can be told without being stated; else why not.
 ///
 /// # Errors

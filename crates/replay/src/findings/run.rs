@@ -1,11 +1,11 @@
 //! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
-use super::{Finding, Severity, orientation, samples, sensors};
+use super::{Finding, Severity, magnetometer, orientation, samples, sensors};
 use crate::summary::aid::Frozen;
 use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
-use strapd_attitude::consistency::Consistency;
+use strapd_attitude::consistency::{Consistency, FieldConsistency};
 use strapd_attitude::estimate::{EstimationSettings, Meaning};
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
@@ -39,6 +39,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) left_out: &'a [(String, u64)],
     /// Gyro held against accelerometer, with what the samples were taken for.
     pub(crate) gyro: Option<(&'a Consistency, &'a EstimationSettings, &'a Meaning)>,
+    /// Gyro held against magnetometer.
+    pub(crate) field: Option<(&'a FieldConsistency, &'a EstimationSettings)>,
     /// Orientations that were compared with; `None` where none were to be.
     pub(crate) references: Option<u64>,
 }
@@ -123,6 +125,13 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     }
     out.extend(orientation::of_run(summary));
     out.extend(noted.gyro.and_then(sensors::disagreement));
+    // A gyro that is wrong against gravity turns against the field, too: the gyro is cured first.
+    let is_gyro_sound = noted
+        .gyro
+        .is_none_or(|(gyro, ..)| gyro.disagreement().is_none());
+    if let Some((field, plan)) = noted.field.filter(|_| is_gyro_sound) {
+        out.extend(magnetometer::finding(field, plan));
+    }
     sensors::settle(&mut out);
     out
 }

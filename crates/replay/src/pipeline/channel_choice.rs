@@ -141,6 +141,19 @@ pub(super) fn besides(
     Ok(besides)
 }
 
+/// Adds a field that nobody asked for to what is read beside the samples of the one topic chosen, to be judged.
+pub(super) fn watch_field(
+    run: &ReplayRequest,
+    log: &Recording,
+    chosen: &[RunTopic<'_>],
+    besides: &mut AuxiliaryInputs,
+) {
+    let [one] = chosen else { return };
+    let has_field = one.plan.channels.iter().any(|(_, d)| d.stated().has_mag);
+    let own = (one.plan.source.topic.as_str(), has_field);
+    besides.watch_field((&run.plan, &run.selection), log, own);
+}
+
 /// Description of which of several stamps is read.
 pub(super) fn which_stamp(decoder: &Decoder) -> Option<String> {
     let stamps = decoder.stamps();

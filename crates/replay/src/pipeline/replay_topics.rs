@@ -4,7 +4,9 @@
 //! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
 //! square of its size.
 
-use super::channel_choice::{Reference, RunTopic, besides, choose_each, reference, route};
+use super::channel_choice::{
+    Reference, RunTopic, besides, choose_each, reference, route, watch_field,
+};
 use super::check::Drawing;
 use super::delivery::{Delivery, Outlet};
 use super::history::History;
@@ -67,7 +69,8 @@ pub(super) fn each(
 
     let prepared = prepare(run, log, (&chosen, &AuxiliaryInputs::default()), pool)?;
     let mut begun = Begun::of((run, path), chosen.into_iter().zip(prepared), &mut told);
-    let besides = besides(run, path, log, &mut begun.chosen)?;
+    let mut besides = besides(run, path, log, &mut begun.chosen)?;
+    watch_field(run, log, &begun.chosen, &mut besides);
     begun.compare(reference.as_ref(), drawing);
     let Begun {
         topics,

@@ -145,7 +145,7 @@ impl Topic {
             what,
         };
         let mut estimator = Estimator::new(plan, &found.resolved, &prepared).map_err(refuse)?;
-        estimator.watch_gyro(&found.resolved);
+        estimator.watch_sensors(&found.resolved, &prepared);
         let against = against
             .then(|| AgainstRecorded::new(plan, &found.resolved, &prepared))
             .transpose()

@@ -96,6 +96,10 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
                 .estimator
                 .consistency()
                 .map(|consistency| (consistency, &run.plan, &topic.resolved)),
+            field: topic
+                .estimator
+                .field_consistency()
+                .map(|consistency| (consistency, &run.plan)),
             references: topic.against.as_ref().map(|a| a.references() as u64),
         },
     );
