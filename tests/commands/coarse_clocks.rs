@@ -83,9 +83,12 @@ fn rows_of_a_logger_that_polls_faster_than_the_sensor_are_repeats_in_motion_and_
     let mut text = HEADER.to_owned();
     for k in 0..1500_i64 {
         let noise = k * 7919 % 11 - 5;
-        text += &format!("{},0.{noise:02},0.1,-0.1,0.0,0.0,1.0\n", k * 20)
-            .replace("0.-", "-0.")
-            .repeat(2);
+        text += &format!(
+            "{},0.{noise:02},0.1,-0.1,0.0,0.0,1.0\n",
+            1_743_300_000_000_i64 + k * 20
+        )
+        .replace("0.-", "-0.")
+        .repeat(2);
     }
     std::fs::write(at.join("a.csv"), text).unwrap();
     for (ran, _) in replayed(at) {

@@ -56,6 +56,9 @@ impl Judged {
     }
 }
 
+/// Evidence, share of the segments that agree, map, and what it leaves.
+type Candidate = (f64, f64, Matrix3<f64>, Judged);
+
 /// Unknowns of a map and a hard iron.
 fn unknowns(map: &Matrix3<f64>, iron: &Vector3<f64>) -> SVector<f64, UNKNOWNS> {
     SVector::from_fn(|i, _| match i {
@@ -116,7 +119,8 @@ pub(super) fn disagreement(kept: &[FieldSegment]) -> Option<FieldDisagreement> {
     if recorded.scatter() < LEAST_RECORDED {
         return None;
     }
-    let (mut best, mut next): (Option<(f64, f64, Matrix3<f64>, Judged)>, f64) = (None, 0.0);
+    let mut best: Option<Candidate> = None;
+    let mut next = 0.0_f64;
     for map in proper().skip(1) {
         let found = judged(&segments, &map);
         let said = recorded.costs.iter().zip(&found.costs);
