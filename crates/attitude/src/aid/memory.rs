@@ -261,7 +261,7 @@ mod tests {
         let of_filter = "calibration correction covariance disturbance drift fields forces gaps_in_a_row given interval \
                          is_started is_widened last last_force last_out last_rate last_up mean_acceleration nominal \
                          plausibility position report residuals rest since_force surroundings velocity vertical \
-                         wants_level";
+                         wants_level world";
         let of_propagator = "added attitude before covariance excess initial last next now open rates resets samples \
                              sum waiting world_since";
         let texts = [

@@ -57,8 +57,10 @@ pub(super) fn run<S: Samples>(
         let settings = aid::Settings { prior, ..settings };
         return pass(samples, with, segments, (settings, Vector3::zeros()));
     }
+    // The corrections by which a large bias is found are of one sign, too: no drift.
     let wide = aid::Settings {
         bias_prior: BIAS_PRIOR * share.min(1.0),
+        bias_drift: 0.0,
         ..settings
     };
     match pass(samples, with, segments, (wide, Vector3::zeros()))? {
