@@ -118,6 +118,11 @@ fn of_scale(
     (plan, unit): (&EstimationSettings, GyroUnit),
 ) -> Finding {
     let is_known = sigma < KNOWN;
+    // An order of size that is no unit's may be the accelerations of a run: nothing was tried that cures it.
+    let severity = match is_known || !(UNIT..=1.0 / UNIT).contains(&factor) {
+        true => Severity::Error,
+        false => Severity::Warning,
+    };
     let times = match is_known {
         true => format!(
             "{} (+- {})",
@@ -128,7 +133,7 @@ fn of_scale(
     };
     let finding = |words: &str| {
         Finding::new(
-            Severity::Error,
+            severity,
             SCALE,
             format!(
                 "gyro and accelerometer disagree: true rates are {times} of the recorded{words}"

@@ -169,3 +169,27 @@ fn a_guess_gives_way_to_a_cause_and_words_that_agree_stay() {
     ];
     assert_eq!(codes(other), [SCALE]);
 }
+
+#[test]
+fn a_factor_of_which_only_the_order_of_size_is_known_is_no_error_unless_it_is_a_units() {
+    let severity = |factor: f64, sigma: f64| {
+        let found = Disagreement {
+            cause: Cause::Scale { factor, sigma },
+            recorded: 0.085,
+            cured: 0.04,
+            segments: 7,
+        };
+        let plan = EstimationSettings::default();
+        let consistency = Consistency::default();
+        of_scale(
+            (&found, &consistency),
+            (factor, sigma),
+            (&plan, GyroUnit::Rad),
+        )
+        .severity
+    };
+    // As a run, simulated without any error of its sensor, looked like.
+    assert_eq!(severity(3.0, 0.07), Severity::Warning);
+    assert_eq!(severity(0.02, 0.3), Severity::Error);
+    assert_eq!(severity(2.0, 0.01), Severity::Error);
+}
