@@ -254,8 +254,8 @@ impl Roles<'_> {
                 Ok(_) => format!(
                     "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
                 ),
-                Err(why) => format!(
-                    "its head says orientation,{axes}, which no body has ({why}): axes are as recorded"
+                Err(_) => format!(
+                    "its head says orientation,{axes}, which no body has: three letters, each axis once; axes are as recorded"
                 ),
             });
         }

@@ -146,4 +146,11 @@ fn rates_of_a_gcsv_are_known_by_its_first_line_alone() {
     let gyro = samples.first().and_then(|sample| sample.gyro);
     assert_eq!(gyro, Some([0.0005, 0.001, 0.0015]));
     assert!(opened(rows).is_err(), "angles, elsewhere");
+    // Axes that no body has are one line of words, for it becomes the text of a warning.
+    let (table, _) = opened(&format!("{head}{rows}").replace(",XYZ", ",0YxZ")).unwrap();
+    let notes = table.notes().join("; ");
+    assert!(
+        notes.contains("0YxZ, which no body has") && !notes.contains('\n'),
+        "{notes}"
+    );
 }
