@@ -199,10 +199,19 @@ fn forces_not_taken(plan: &EstimationSettings, log: &Recording, own: &str) -> Op
     let names: Vec<&str> = others.filter(|topic| *topic != own).collect();
     let first = names.first()?;
     Some(format!(
-        "the samples carry no specific force, so the gyro alone gives the attitude; forces are on {} ({AID} gravity {ACCEL_TOPIC} {} takes them)",
-        named_few(&names),
+        "{} ({AID} gravity {ACCEL_TOPIC} {} takes them)",
+        forces_elsewhere(&names),
         printable(first)
     ))
+}
+
+/// Words for samples without a specific force in a log that has forces on these topics.
+#[must_use]
+pub fn forces_elsewhere(topics: &[&str]) -> String {
+    format!(
+        "the samples carry no specific force, so the gyro alone gives the attitude; forces are on {}",
+        named_few(topics)
+    )
 }
 
 /// The channels with vectors of this kind, with their decoders.

@@ -8,7 +8,8 @@ use strapd_attitude::condition::quality::GravityAxis;
 use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::setting::{ACCEL_SIGN, ACCEL_TOPIC, AID, BODY, COLUMNS, GYRO_UNIT, MOUNT};
 use strapd_recording::format::Format;
-use strapd_recording::text::{named_few, printable};
+use strapd_recording::recording::beside::forces_elsewhere;
+use strapd_recording::text::printable;
 
 /// Below this correlation the accelerometer reads too much besides gravity.
 const MIN_CORRELATION: f64 = 0.7;
@@ -82,10 +83,7 @@ pub(super) fn elsewhere(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         Finding::new(
             Severity::Note,
             "force-on-another-topic",
-            format!(
-                "the samples carry no specific force, so the gyro alone gives the attitude; forces are on {}",
-                named_few(&names)
-            ),
+            forces_elsewhere(&names),
         )
         .with("topics", json!(names))
         .advise("gravity then corrects the tilt")
