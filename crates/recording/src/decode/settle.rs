@@ -4,11 +4,12 @@
 //! Apart from the decoder because it happens once, before the first sample, and a daemon settles units
 //! in its own way.
 
+use super::definition::nothing_wanted;
 use super::json;
 use super::registers::{Form, StampForm};
 use super::select::MatchQuality;
 use super::stamp::{Ambiguous, Bare, MOST_WAITING, UnitEvidence, unit_in_log};
-use super::{Decoder, FieldRole, Program, Unsupported, Wanted, nothing_wanted, unsupported};
+use super::{Decoder, FieldRole, Program, Unsupported, Wanted, unsupported};
 use crate::text::printable;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::record::TimeUnit;
