@@ -22,6 +22,7 @@ mod own_output;
 mod patterns;
 pub mod progress;
 pub mod recover;
+pub mod relative;
 pub mod replay;
 pub mod report;
 pub mod send;
@@ -65,6 +66,7 @@ fn sinks(subject: &str, besides: &str, rest: &str) -> String {
   strapd info flight.mcap                      what is in it, and how good it is
   strapd replay flight.mcap -o attitude.mcap   gyro samples to attitude
   strapd compare attitude.mcap flight.mcap     how far from a recorded orientation
+  strapd relative thigh.mcap shank.mcap        the angle of the joint between two sensors
   strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
   strapd report flight.mcap -o flight.html     all that can be said about it, on one page
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
@@ -186,6 +188,8 @@ pub enum Command {
     Report(Box<report::Report>),
     /// Time-aligned angle error between two attitudes
     Compare(compare::Compare),
+    /// Attitude of one body relative to another: the angle of the joint between them
+    Relative(relative::Relative),
     /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table
     Cat(cat::Cat),
     /// A recording's samples to a daemon, as fast as they were measured
@@ -293,6 +297,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Check(command) => check::run(&cli.global, &command),
         Command::Report(command) => report::run(&cli.global, *command),
         Command::Compare(command) => compare::run(&cli.global, &command),
+        Command::Relative(command) => relative::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
         Command::Send(command) => send::run(&cli.global, &command),
         Command::Watch(command) => watch::run(&cli.global, &command),

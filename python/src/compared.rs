@@ -87,14 +87,20 @@ pub fn compare<'py>(
 }
 
 /// World and body of a label; start and level are FLU bodies in a world with z up.
-fn convention(name: &str, world: &str) -> PyResult<Convention> {
+pub(crate) fn convention(name: &str, world: &str) -> PyResult<Convention> {
     let world: World = world
         .parse()
         .map_err(|e| argument(format!("{name}: {e}")))?;
     Ok(world.convention().unwrap_or(Convention::EnuFlu))
 }
 
-fn stamped(name: &str, t: &Times<'_>, q: &Rows<'_>, from: Convention) -> PyResult<Vec<Stamped>> {
+/// Stamped attitudes of arrays, to FLU.
+pub(crate) fn stamped(
+    name: &str,
+    t: &Times<'_>,
+    q: &Rows<'_>,
+    from: Convention,
+) -> PyResult<Vec<Stamped>> {
     let (t, flat) = match (t.as_slice(), q.as_slice()) {
         (Ok(t), Ok(q)) => (t, q),
         _ => return Err(argument(format!("{name}: not C-contiguous"))),
@@ -126,26 +132,37 @@ fn known(
     cov: &Rows<'_>,
     from: Convention,
 ) -> PyResult<Vec<UncertainAttitude>> {
-    if cov.shape() != [estimate.len(), 6] {
+    let covariances = covariances(estimate.len(), cov, from)?;
+    let all = estimate.iter().zip(covariances);
+    let all = all.map(|((stamp, q_nb), covariance)| UncertainAttitude {
+        stamp: *stamp,
+        q_nb: *q_nb,
+        covariance,
+    });
+    Ok(all.collect())
+}
+
+/// Covariances of `rows` attitudes, about the axes of an FLU body.
+pub(crate) fn covariances(
+    rows: usize,
+    cov: &Rows<'_>,
+    from: Convention,
+) -> PyResult<Vec<AttitudeCovariance>> {
+    if cov.shape() != [rows, 6] {
         return Err(argument(format!(
-            "cov: of shape {:?} for {} attitudes",
-            cov.shape(),
-            estimate.len()
+            "cov: of shape {:?} for {rows} attitudes",
+            cov.shape()
         )));
     }
     let flat = cov
         .as_slice()
         .map_err(|_| argument("cov: not C-contiguous"))?;
-    let (rows, _) = flat.as_chunks::<6>();
-    let all = estimate.iter().zip(rows).map(|((stamp, q_nb), upper)| {
+    let (uppers, _) = flat.as_chunks::<6>();
+    let all = uppers.iter().map(|upper| {
         let covariance = AttitudeCovariance::from_upper(*upper);
-        UncertainAttitude {
-            stamp: *stamp,
-            q_nb: *q_nb,
-            covariance: match from {
-                Convention::EnuFlu => covariance,
-                other => covariance.relabelled(|v| other.convert_body(Convention::EnuFlu, v)),
-            },
+        match from {
+            Convention::EnuFlu => covariance,
+            other => covariance.relabelled(|v| other.convert_body(Convention::EnuFlu, v)),
         }
     });
     Ok(all.collect())

@@ -13,6 +13,7 @@
 //! | [`live`] | samples as they come -> attitudes |
 //! | [`calibration`] | the calibration of a sensor <-> a dict |
 //! | [`compared`] | two attitudes -> how far apart |
+//! | [`joint`] | attitudes of two bodies -> one relative to the other |
 //! | [`words`] | the command's flags -> a replay to be done |
 //! | [`recorded`] | a recorded log -> attitudes |
 //! | [`samples_of_log`], [`simulated`], [`raw_columns`] | a recorded log, or a motion -> samples as numpy arrays |
@@ -29,6 +30,7 @@ mod calibration;
 mod columns;
 mod compared;
 mod errand;
+mod joint;
 mod live;
 mod looked;
 mod noted;
@@ -47,6 +49,8 @@ mod _strapd {
     use crate::batch::estimate;
     #[pymodule_export]
     use crate::compared::compare;
+    #[pymodule_export]
+    use crate::joint::relative;
     #[pymodule_export]
     use crate::live::Live;
     #[pymodule_export]

@@ -46,9 +46,6 @@ pub struct Compare {
     /// Topic or id of the reference
     #[arg(long, value_name = "NAME")]
     pub ref_topic: Option<String>,
-    /// Layout of a table.
-    #[command(flatten)]
-    pub tables: Tables,
     /// Constant rotation of the world to remove first: none, first (equal at the first common
     /// instant), first-heading (the same, about the vertical only), heading (about the vertical, least
     /// squares), best (least squares)
@@ -63,6 +60,9 @@ pub struct Compare {
     /// Replace a chart that exists
     #[arg(long)]
     pub force: bool,
+    /// Layout of a table.
+    #[command(flatten)]
+    pub tables: Tables,
 }
 
 /// Runs it.
@@ -256,7 +256,7 @@ fn chart(estimate: &[Stamped], reference: Reference<'_>, align: Align, errors: &
 }
 
 /// Attitudes of a track. A row that is no rotation becomes one with NaN, so that the comparison counts it.
-fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
+pub(super) fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
     track
         .entries
         .iter()
@@ -269,7 +269,11 @@ fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
         .collect()
 }
 
-fn no_match(estimate: &attitude_track::Track, reference: &attitude_track::Track) -> Error {
+/// Error of two tracks without an instant in common.
+pub(super) fn no_match(
+    estimate: &attitude_track::Track,
+    reference: &attitude_track::Track,
+) -> Error {
     let span = |t: &attitude_track::Track| match (t.entries.first(), t.entries.last()) {
         (Some((a, _)), Some((b, _))) => {
             format!(

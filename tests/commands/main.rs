@@ -35,6 +35,7 @@ mod passes;
 mod px4;
 mod recover;
 mod regularise;
+mod relative;
 mod replay;
 mod report;
 mod rosbag2;

@@ -15,7 +15,7 @@ mod align;
 mod body_axes;
 mod consistency;
 mod constant_bias;
-mod matching;
+pub(crate) mod matching;
 mod reference;
 mod relative;
 mod statistics;

@@ -21,6 +21,7 @@
 //! | [`consistency`] | rates and forces -> whether gyro and accelerometer speak of the same body |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
+//! | [`joint`] | attitudes of two bodies -> the angle of the joint between them |
 //! | [`setting`] | what can be set for a run -> what a person reads of it |
 //!
 //! # From raw samples to attitude
@@ -62,6 +63,7 @@ pub mod diagnostic;
 pub mod digits;
 pub mod estimate;
 pub mod frames;
+pub mod joint;
 mod median;
 pub mod noise;
 pub mod plausible;

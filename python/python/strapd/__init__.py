@@ -16,6 +16,7 @@ from ._recordings import Finding, Log, check, replay
 
 # Not in __all__: `from strapd import *` is to leave Python's own alone.
 from ._recordings import open as open  # noqa: A004
+from ._relative import Relative, relative
 from ._samples import Samples, Simulation, read, simulate
 from ._settings import Settings
 from ._strapd import __version__
@@ -28,6 +29,7 @@ __all__ = [
     "Finding",
     "Log",
     "LossWarning",
+    "Relative",
     "ResolutionWarning",
     "Samples",
     "Settings",
@@ -39,6 +41,7 @@ __all__ = [
     "estimate",
     "integrate",
     "read",
+    "relative",
     "replay",
     "simulate",
 ]

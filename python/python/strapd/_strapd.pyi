@@ -8,7 +8,7 @@ _Floats = npt.NDArray[np.float64]
 _Nanos = npt.NDArray[np.int64]
 _Outcome = tuple[str, list[str], dict[str, Any]]
 
-__all__ = ["Live", "__version__", "check_log", "check_settings", "compare", "estimate", "info", "read", "replay", "simulate"]
+__all__ = ["Live", "__version__", "check_log", "check_settings", "compare", "estimate", "info", "read", "relative", "replay", "simulate"]
 
 __version__: str
 
@@ -31,6 +31,18 @@ def compare(
     ref_q: _Floats,
     ref_world: str,
     align: str,
+    /,
+) -> dict[str, Any]: ...
+def relative(
+    t: _Nanos,
+    q: _Floats,
+    world: str,
+    cov: Optional[_Floats],
+    second_t: _Nanos,
+    second_q: _Floats,
+    second_world: str,
+    second_cov: Optional[_Floats],
+    heading: str,
     /,
 ) -> dict[str, Any]: ...
 def check_settings(settings: dict[str, Any]) -> None: ...

@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 const LONGEST_BRIDGE: i64 = 4;
 
 /// A track in time order, attitudes only.
-pub(super) struct Track<'a> {
+pub(crate) struct Track<'a> {
     pub(super) rows: Cow<'a, [Stamped]>,
     /// Number of rows that were no attitude.
     pub(super) bad: usize,
@@ -22,7 +22,7 @@ pub(super) struct Track<'a> {
 }
 
 impl<'a> Track<'a> {
-    pub(super) fn new(given: &'a [Stamped]) -> Track<'a> {
+    pub(crate) fn new(given: &'a [Stamped]) -> Track<'a> {
         let is_attitude =
             |(_, q): &Stamped| Quaternion::<Nav, Body>::try_from_wxyz(q.wxyz()).is_ok();
         let in_order = given.is_sorted_by_key(|(stamp, _)| *stamp);
@@ -42,14 +42,14 @@ impl<'a> Track<'a> {
 }
 
 /// Why there is no attitude at an instant.
-pub(super) enum Missing {
+pub(crate) enum Missing {
     Outside,
     InGap,
 }
 
 impl Track<'_> {
     /// The attitude at an instant, interpolated, by the place of the first row after it.
-    pub(super) fn at(&self, stamp: Nanos, after: usize) -> Result<Quaternion<Nav, Body>, Missing> {
+    pub(crate) fn at(&self, stamp: Nanos, after: usize) -> Result<Quaternion<Nav, Body>, Missing> {
         let before = after.checked_sub(1).and_then(|i| self.rows.get(i));
         match (before, self.rows.get(after)) {
             (Some((t, q)), _) if *t == stamp => Ok(q.normalised()),
