@@ -7,14 +7,14 @@
 //!
 //! ```text
 //! path, stream -> input -> opened (survey, first messages, sources) -> topics -> samples
-//!     folder, line_input, text_log: beside it                  topic_plan, channel_route: on the workers
+//!     folder, archive, line_input, text_log: beside it                  topic_plan, channel_route: on the workers
 //! what comes once -> incoming -> messages, lines
 //! lines, whether they come once or more often -> line_reader -> text_channels, text_log
 //! ```
 //!
 //! | file | |
 //! |---|---|
-//! | [`input`], `folder`, `line_input`, [`incoming`] | what can be read again, the recording in a folder, lines and rows, what comes once |
+//! | [`input`], `folder`, `archive`, `line_input`, [`incoming`] | what can be read again, the recording in a folder or in a ZIP, lines and rows, what comes once |
 //! | [`opened`], `first_messages`, [`text_log`], `text_channels`, [`log_channel`], [`payload_type`], [`sources`], `turns` | what is in a log, or in a text; the channels of a text; what a channel can serve as; the type of its payloads; who speaks on a topic |
 //! | `line_reader`, `sample_cache` | the samples of lines, sensor by sensor; those of a text, kept for the next walk |
 //! | [`selection`], [`topics`], [`log_topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
@@ -23,6 +23,7 @@
 //! | [`own_output`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
 
+mod archive;
 mod bare_stamps;
 pub mod beside;
 pub mod channel_route;

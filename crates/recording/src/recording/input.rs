@@ -1,10 +1,11 @@
-//! A file, a pipe or standard input -> what can be read as often as is needed. I/O.
+//! A file, a folder, an archive, a pipe or standard input -> what can be read as often as is needed. I/O.
 //!
 //! Apart from the log because it comes before anything is known of one: where the bytes are, and what they are. What
 //! comes
 //! only once is put into a file of its own that has no name and goes with this process: who looks twice sees the same
 //! bytes, and what is said of a log does not depend on how it came.
 
+use super::archive::{self, Unpacked};
 use super::folder::{self, Folder};
 use super::line_input;
 use super::several;
@@ -128,6 +129,8 @@ pub struct Input {
     beside: Vec<PathBuf>,
     /// The files it is in, where it is in several.
     parts: Vec<PathBuf>,
+    /// Folder that `name` and its parts lie in, where it came as an archive.
+    unpacked: Option<Arc<Unpacked>>,
     warn: Warn,
 }
 
@@ -144,21 +147,23 @@ impl Input {
             Source::Elsewhere(address) => Input::of_address(address, warn),
             _ if is_pipe(path) => Input::of_stream(path, open(path)?, warn),
             source if path.is_dir() => {
-                let Folder {
-                    main,
-                    format,
-                    beside,
-                    parts,
-                } = folder::of(path, warn)?;
-                Ok(Input {
-                    source,
-                    name: main,
-                    kept: None,
-                    format,
-                    beside,
-                    parts,
-                    warn: warn.clone(),
-                })
+                let folder = folder::of(path, warn)?;
+                Ok(Input::of_folder(source, folder, warn))
+            }
+            source if archive::is_zip(path) => {
+                let unpacked = archive::unpack(path)?;
+                let folder = folder::of(unpacked.path(), warn).map_err(|why| match why {
+                    Error::Unsupported { what, .. } => Error::unsupported(path, what),
+                    other => other,
+                })?;
+                let mut input = Input::of_folder(source, folder, warn);
+                if input.parts.is_empty() {
+                    // Opened, so that messages need not name a folder that nobody knows.
+                    input.kept = Some(Rereadable::File(Arc::new(open(&input.name)?)));
+                    input.name = unpacked.name_of(path, &input.name);
+                }
+                input.unpacked = Some(Arc::new(unpacked));
+                Ok(input)
             }
             source => Ok(Input {
                 source,
@@ -167,8 +172,22 @@ impl Input {
                 format: recognised(path, warn)?,
                 beside: Vec::new(),
                 parts: Vec::new(),
+                unpacked: None,
                 warn: warn.clone(),
             }),
+        }
+    }
+
+    fn of_folder(source: Source, found: Folder, warn: &Warn) -> Input {
+        Input {
+            source,
+            name: found.main,
+            kept: None,
+            format: found.format,
+            beside: found.beside,
+            parts: found.parts,
+            unpacked: None,
+            warn: warn.clone(),
         }
     }
 
@@ -199,6 +218,7 @@ impl Input {
             format,
             beside: Vec::new(),
             parts: Vec::new(),
+            unpacked: None,
             warn: warn.clone(),
         })
     }
@@ -234,6 +254,7 @@ impl Input {
             format: formats.first().map_or(Format::Mcap, |(_, format)| *format),
             beside: Vec::new(),
             parts: paths.to_vec(),
+            unpacked: None,
             warn: warn.clone(),
         })
     }
@@ -294,6 +315,7 @@ impl Input {
             name,
             beside: Vec::new(),
             parts: Vec::new(),
+            unpacked: None,
             warn: warn.clone(),
         })
     }
