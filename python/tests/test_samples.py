@@ -114,7 +114,7 @@ def test_a_simulation_has_the_bits_of_the_commands(
 def test_truth_is_what_a_comparison_takes() -> None:
     top = strapd.simulate("top", rate_hz=2000, duration=2)
     start = top.truth[1][0]
-    found = strapd.compare(strapd.integrate(top.gyr, t=top.t, init=start), top.truth, align="none")
+    found = strapd.compare(strapd.integrate(top.gyr, t=top.t, kind=top.kind, init=start), top.truth, align="none")
     # The floor of the integrator, docs/accuracy.md.
     assert found["total"]["max_deg"] < 1e-10 and found["samples"] == 4001
     assert top.orientation is None and np.allclose(top.truth_rate, top.gyr)

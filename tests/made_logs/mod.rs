@@ -84,9 +84,11 @@ pub fn bytes(packing: Packing, chunk: u64, messages: &[Logged]) -> Vec<u8> {
             imu_cdr::imu_definition().as_bytes(),
         )
         .unwrap();
+    // The rates of the motion at the stamps: no message says so.
+    let metadata = [("sample_kind".to_owned(), "rate".to_owned())].into();
     for (sequence, message) in messages.iter().enumerate() {
         let channel_id = writer
-            .add_channel(schema, message.topic, "cdr", &Default::default())
+            .add_channel(schema, message.topic, "cdr", &metadata)
             .unwrap();
         let header = mcap::records::MessageHeader {
             channel_id,

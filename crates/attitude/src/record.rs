@@ -60,6 +60,11 @@ impl Nanos {
 /// Meaning of a gyro sample in time. It matters more than the order of the integrator
 /// (`docs/accuracy.md`), so it is explicit everywhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
 pub enum SampleKind {
     /// Instantaneous rate at the stamp, rad/s.
     #[default]

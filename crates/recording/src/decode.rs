@@ -25,6 +25,7 @@ mod fields;
 pub mod framing;
 mod handed;
 mod json;
+mod makers;
 pub mod packed;
 mod protobuf;
 mod refusal;
@@ -419,7 +420,16 @@ impl Decoder {
     pub fn of_topic(&self, topic: &str) -> Decoder {
         let mut other = self.clone();
         other.label[0] = printable(topic);
+        other.stated.declared.usual_kind = makers::usual_kind([topic, &self.label[1]]);
         other
+    }
+
+    /// The same for messages whose channel states that their samples are of this kind.
+    #[must_use]
+    pub(crate) fn stating(mut self, kind: Option<SampleKind>) -> Decoder {
+        let declared = &mut self.stated.declared;
+        declared.sample_kind = declared.sample_kind.or(kind);
+        self
     }
 
     /// Statements of type and schema, and the fields that were chosen.

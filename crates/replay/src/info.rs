@@ -190,7 +190,8 @@ fn topic_json(looked: &Inspection) -> Value {
         "accel_when_quietest": q.accel_at_rest,
         "aid": aids_json(&looked.aid),
         "sample_kind": looked.resolved.kind.name(),
-        "sample_kind_stated": looked.kind_stated,
+        "sample_kind_stated": looked.resolved.kind_reason.is_stated(),
+        "sample_kind_by": looked.resolved.kind_reason.name(),
         "gyro_unit": looked.resolved.unit.name(),
         "input_axes": looked.resolved.body.to_string(),
         "rests": looked.rests.kept.iter().take(RESTS).map(|r| json!({

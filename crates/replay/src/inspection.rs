@@ -27,8 +27,6 @@ pub struct Inspection {
     pub frame: String,
     /// Meaning of its samples by default.
     pub resolved: Meaning,
-    /// Whether the format states the meaning of a sample.
-    pub kind_stated: bool,
     /// Statistics.
     pub quality: QualitySummary,
     /// The unit of its rates: rad/s where the format states any, else that which was taken for granted.

@@ -119,13 +119,12 @@ def estimate(
     :param t: (n,) integer nanoseconds, float seconds or datetime64.
     :param rate_hz: samples a second, in place of ``t``.
     :param aid: what corrects the gyro: ``gravity``, ``gravity+mag``, ``none``; ``auto`` takes what there is.
-    :param kind: what a sample means in time: the ``rate`` at its stamp (as without it), the ``average`` over the interval that ends
-        there, or the ``delta-angle`` turned in it; ``rotation``: the rotation vector of the whole turn in it, coning included.
+    :param kind: what a sample means in time: the ``rate`` at its stamp, the ``average`` over the interval that ends
+        there (as without it where the ordinary step is at most 20 ms; ``rate`` above), or the ``delta-angle`` turned in it; ``rotation``: the rotation vector of the whole turn in it, coning included.
     :param dt: how long each sample was taken over, as ``t``; where it is not the step between stamps.
     :param orientation: (n, 4) w, x, y, z, for ``init="first-orientation"``.
     :param smooth: the whole recording at once (``strapd replay --smooth``): better than any filter, and calibrated from
-        the recording itself. Rates in steps of 5 ms and less are taken as means since the one before, unless ``kind`` says
-        ``rate``. What could not be smoothed as asked is a :class:`SmoothingWarning`.
+        the recording itself. What could not be smoothed as asked is a :class:`SmoothingWarning`.
     :param strict: raise :class:`Error` where samples were lost, instead of a :class:`LossWarning`.
     :param settings: see :class:`Settings`.
     :raises ValueError: an argument that cannot be, by name.
@@ -149,7 +148,7 @@ def integrate(
     gyr: npt.ArrayLike,
     t: Optional[npt.ArrayLike] = None,
     rate_hz: Optional[float] = None,
-    kind: Kind = "rate",
+    kind: Optional[Kind] = None,
     method: str = "auto",
     *,
     dt: Optional[npt.ArrayLike] = None,
@@ -173,7 +172,7 @@ class Estimator(_strapd.Live):
         cls,
         *,
         aid: Aid = "auto",
-        kind: Kind = "rate",
+        kind: Optional[Kind] = None,
         method: str = "commit",
         rate_hz: Optional[float] = None,
         finals: bool = False,

@@ -197,6 +197,7 @@ impl Gathering {
             return Err(Diagnostic::from(&fatal));
         }
         self.notes.extend(warning.map(|w| w.to_string()));
+        self.resolved = self.resolved.settled(&first, clock);
         let settings = self
             .resolved
             .conditioning(&self.plan, clock, BodyRate::ZERO);

@@ -5,6 +5,7 @@ use crate::report::findings::of_samples;
 use crate::report::summary::{human_bytes, significant};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use strapd_attitude::estimate::KindReason;
 use strapd_recording::format::Format;
 use strapd_recording::recording::log_channel::{LogChannel, described};
 use strapd_recording::text::named_few;
@@ -228,10 +229,10 @@ fn write_meaning(looked: &Inspection, out: &mut String) {
             n => format!("in {n} messages"),
         },
         looked.resolved.kind.name(),
-        if looked.kind_stated {
-            " (stated by the format)"
-        } else {
-            " (--sample-kind)"
+        match looked.resolved.kind_reason {
+            reason @ (KindReason::Step(_) | KindReason::Unknown) =>
+                format!(" ({reason}; --sample-kind rate|average as its manual says)"),
+            reason => format!(" ({reason})"),
         }
     );
 }

@@ -225,7 +225,7 @@ impl SensorStream {
     /// Whether a later line means the same by its numbers as the first. `plan` wins over both.
     #[must_use]
     pub fn agrees(&self, plan: &EstimationSettings, line: &Line) -> bool {
-        let (kind, unit) = (self.resolved.kind, self.resolved.unit);
+        let (kind, unit) = (self.estimator.sample_kind().kind, self.resolved.unit);
         plan.kind.or(line.sample_kind).unwrap_or(kind) == kind
             && plan.unit.or(line.gyro_unit).unwrap_or(unit) == unit
     }
@@ -389,6 +389,9 @@ impl SensorStream {
             return;
         };
         self.first = saved.span().first;
+        if let Some(choice) = saved.memory().and_then(Memory::sample_kind) {
+            self.estimator.keep_kind(choice);
+        }
         let step = stamp.map(|stamp| stamp.since(saved.span().last));
         let is_near = step.is_some_and(|step| plan.bridges(step));
         let resumed = match saved.memory().filter(|_| is_near) {
@@ -420,6 +423,9 @@ impl SensorStream {
         let plan = &expecting(plan, forces == Some(Forces::Beside));
         let prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
         let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
+        if self.estimator.is_kind_decided() {
+            estimator.keep_kind(self.estimator.sample_kind());
+        }
         let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
         if labels.world_axes != self.channel.stream().world_axes {
             return Err(fault(format!(
@@ -495,7 +501,8 @@ impl SensorStream {
             } else if self.joining == Joining::Joined || !self.is_again(plan, raw) {
                 self.reset_if_asked(plan, raw);
                 self.estimator.take(raw);
-                self.intervals.take(raw, plan.clock, self.resolved.kind);
+                let kind = self.estimator.sample_kind().kind;
+                self.intervals.take(raw, plan.clock, kind);
                 self.stamp_unit.take(raw, plan.clock);
             }
         }
@@ -622,7 +629,8 @@ impl SensorStream {
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "jitter_s": self.jitter_secs,
             "stamp_unit": self.stamps.unit().map(TimeUnit::name),
-            "sample_kind": self.resolved.kind.name(),
+            "sample_kind": self.estimator.sample_kind().kind.name(),
+            "sample_kind_by": self.estimator.sample_kind().reason.name(),
             "gyro_unit": self.resolved.unit.name(),
             "world": self.channel.stream().world_axes,
             "body": self.channel.stream().body_axes,

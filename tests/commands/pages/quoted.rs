@@ -18,7 +18,7 @@ mod example {
 
     pub fn attitudes(samples: &[RawSample]) -> Result<Vec<AttitudeSample>, Diagnostic> {
         let plan = EstimationSettings::default(); // the flags of `replay`, as fields
-        let meaning = Meaning::new(&plan, &Declared::default()); // rad/s at the stamps, x forward, y left, z up
+        let meaning = Meaning::new(&plan, &Declared::default()); // rad/s, x forward, y left, z up; means or rates by their step
         let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);
         for sample in samples {
             preparation.take(sample)?;

@@ -165,6 +165,11 @@ impl AidedPropagator {
         self.innovations.get_or_insert_default();
     }
 
+    /// Whether they are kept.
+    pub(crate) fn keeps_innovations(&self) -> bool {
+        self.innovations.is_some()
+    }
+
     /// Takes the innovations kept since the last call, each with the stamp of the correction.
     pub fn innovations(&mut self) -> Vec<(Nanos, Innovation)> {
         self.innovations

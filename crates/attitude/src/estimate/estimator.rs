@@ -10,8 +10,12 @@ use super::integrator::{AuxiliaryVector, Integrator};
 use super::kept::{Spool, SpoolError};
 use super::magnetometer_watch::MagnetometerWatch;
 use super::meaning::Meaning;
+use super::memory::Memory;
+use super::open_kind::{Event, OpenKind};
+use super::output_frame::{OutputFrame, turned_north};
 use super::plan::{EstimationSettings, Initial, Noise};
-use super::preparation::Prepared;
+use super::preparation::{Prepared, is_causal};
+use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
 use crate::aid::{self, AidedPropagator};
@@ -19,13 +23,9 @@ use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
 use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
-use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
-use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
 use crate::smooth::{PriorScale, PriorSigmas};
-use crate::worlds::{Convention, World};
-use nalgebra::Vector3;
 
 /// Samples at once that memory is kept for.
 const FEW: usize = 8;
@@ -52,7 +52,15 @@ pub struct Estimator {
     rates: Vec<RateSample>,
     /// The same with their new stamps.
     even: Vec<RateSample>,
-    out: Vec<AttitudeSample>,
+    pub(super) out: Vec<AttitudeSample>,
+    /// Kind of the samples by now, and why.
+    pub(super) sample_kind: KindChoice,
+    /// Beginning of a stream whose kind is still to be decided.
+    pub(super) open: Option<Box<OpenKind>>,
+    /// Attitudes that were made before the kind was decided, and have not left.
+    pub(super) before: Vec<AttitudeSample>,
+    /// Attitudes up to this stamp have left as of another kind; until the first beyond it.
+    pub(super) left_until: Option<Nanos>,
 }
 
 /// Auxiliary inputs: what is taken beside the rates.
@@ -64,52 +72,6 @@ struct AuxiliaryInputs {
     has_field: bool,
     /// Multiplies forces, once the first has come.
     force_scale: Option<f64>,
-}
-
-/// State of an estimator at one moment: a few kilobytes of text.
-#[derive(Clone, PartialEq, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Memory {
-    settings: u64,
-    conditioning: condition::Memory,
-    propagation: propagate::Memory,
-    #[cfg_attr(
-        feature = "serde",
-        serde(default, skip_serializing_if = "Option::is_none")
-    )]
-    aiding: Option<aid::Memory>,
-    #[cfg_attr(
-        feature = "serde",
-        serde(default, skip_serializing_if = "Option::is_none")
-    )]
-    force_scale: Option<f64>,
-}
-
-impl Memory {
-    /// The last stamp that was used.
-    #[must_use]
-    pub fn last(&self) -> Option<Nanos> {
-        self.conditioning.last()
-    }
-
-    /// Whether an estimator can have known it, whatever its settings: a file may say anything.
-    #[must_use]
-    pub fn is_plausible(&self) -> bool {
-        let scale = self.force_scale.unwrap_or(1.0);
-        self.conditioning.is_plausible()
-            && self.propagation.is_plausible()
-            && self.aiding.as_ref().is_none_or(aid::Memory::is_plausible)
-            && scale.is_finite()
-            && scale > 0.0
-    }
-
-    /// Whether specific forces came in messages of their own.
-    #[must_use]
-    pub fn has_forces_beside(&self) -> bool {
-        self.aiding
-            .as_ref()
-            .is_some_and(aid::Memory::has_forces_beside)
-    }
 }
 
 impl Estimator {
@@ -131,6 +93,10 @@ impl Estimator {
         ) {
             return Estimator::live(plan, resolved, prepared);
         }
+        let resolved = &match resolved.is_kind_open() {
+            true => resolved.with_kind(&prepared.sample_kind),
+            false => resolved.clone(),
+        };
         let settings = conditioning(plan, resolved, prepared);
         Estimator::with(plan, resolved, prepared, &settings)
     }
@@ -141,6 +107,30 @@ impl Estimator {
     /// # Errors
     /// As [`Estimator::new`].
     pub fn live(
+        plan: &EstimationSettings,
+        resolved: &Meaning,
+        prepared: &Prepared,
+    ) -> Result<Estimator, Diagnostic> {
+        let is_open = is_causal(plan)
+            && matches!(
+                resolved.kind_reason,
+                KindReason::Unknown | KindReason::Step(_)
+            );
+        if !is_open {
+            return Estimator::live_of_kind(plan, resolved, prepared);
+        }
+        // Undecided until there is a step, whoever has looked ahead.
+        let resolved = resolved.with_kind(&KindChoice::OPEN);
+        let prepared = Prepared {
+            sample_kind: KindChoice::OPEN,
+            ..prepared.clone()
+        };
+        let mut estimator = Estimator::live_of_kind(plan, &resolved, &prepared)?;
+        estimator.open = Some(Box::new(OpenKind::new(plan, &resolved, &prepared)));
+        Ok(estimator)
+    }
+
+    pub(super) fn live_of_kind(
         plan: &EstimationSettings,
         resolved: &Meaning,
         prepared: &Prepared,
@@ -196,7 +186,6 @@ impl Estimator {
                         let usual = aid::Settings::default();
                         let told = SmoothingInputs {
                             kind: resolved.kind,
-                            is_kind_stated: resolved.is_kind_stated,
                             heading,
                             looseness: PriorScale {
                                 scale: aiding.settings.scale_prior / usual.scale_prior,
@@ -244,6 +233,10 @@ impl Estimator {
             rates: Vec::new(),
             even: Vec::new(),
             out: Vec::new(),
+            sample_kind: resolved.kind_choice(),
+            open: None,
+            before: Vec::new(),
+            left_until: None,
         })
     }
 
@@ -253,6 +246,7 @@ impl Estimator {
     /// # Errors
     /// In words: it is no rotation.
     pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), Diagnostic> {
+        self.note(|| Event::Resume(Box::new(*last)));
         let last = self.asked.undone(last);
         self.integrator.resume(&last)
     }
@@ -261,7 +255,8 @@ impl Estimator {
     /// where stamps are regularised, which is not kept.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
-        if self.regulariser.is_some() || !self.beside.is_empty() {
+        let is_open = self.sample_kind.reason == KindReason::Unknown;
+        if self.regulariser.is_some() || !self.beside.is_empty() || is_open {
             return None;
         }
         let (propagation, aiding) = self.integrator.memory()?;
@@ -271,6 +266,10 @@ impl Estimator {
             propagation,
             aiding,
             force_scale: self.besides.as_ref().and_then(|b| b.force_scale),
+            sample_kind: match self.sample_kind.reason {
+                KindReason::Step(step) => Some((self.sample_kind.kind, step)),
+                _ => None,
+            },
         })
     }
 
@@ -278,6 +277,9 @@ impl Estimator {
     /// is as before, when that had other settings or no estimator can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
+        if let Some(choice) = memory.sample_kind() {
+            self.keep_kind(choice);
+        }
         if self.regulariser.is_some() || self.settings != memory.settings {
             return false;
         }
@@ -287,6 +289,8 @@ impl Estimator {
                 .integrator
                 .recall(&memory.propagation, memory.aiding.as_ref());
         if fits {
+            // What is recalled cannot be estimated again.
+            self.open = None;
             self.conditioner = conditioner;
             if let Some(besides) = &mut self.besides {
                 besides.force_scale = memory.force_scale.filter(|s| s.is_finite());
@@ -298,6 +302,7 @@ impl Estimator {
     /// Begins as the run after that of `before`, whose samples stay counted: the first attitude says
     /// that it was reset.
     pub fn continue_counts_of(&mut self, before: &condition::Report, resets: u32) {
+        self.note(|| Event::ContinueCounts(Box::new(before.clone()), resets));
         self.conditioner.continue_counts_of(before);
         self.integrator.continue_counts_of(resets);
     }
@@ -307,6 +312,7 @@ impl Estimator {
     ///
     /// [`Status::RESET`]: crate::record::Status::RESET
     pub fn begin_anew(&mut self, anew: &RestartRequest) {
+        self.note(|| Event::Restart(Box::new(anew.clone())));
         self.integrator.begin_anew(anew);
         self.begins_anew = true;
     }
@@ -317,6 +323,7 @@ impl Estimator {
     /// [`Status::RESET`]: crate::record::Status::RESET
     /// [`AidedPropagator::turn_heading`]: crate::aid::AidedPropagator::turn_heading
     pub fn turn_heading(&mut self, heading: f64) -> bool {
+        self.note(|| Event::Heading(heading));
         self.integrator.turn_heading(heading)
     }
 
@@ -328,12 +335,16 @@ impl Estimator {
 
     /// A sample came that its sender has sent before: it is counted, and nothing else.
     pub fn take_late(&mut self, stamp: Nanos) {
+        self.note(|| Event::Late(stamp));
         self.conditioner.push_late(stamp);
     }
 
     /// Takes the next sample.
     #[inline]
     pub fn take(&mut self, raw: &RawSample) {
+        if self.open.is_some() {
+            self.decide_kind_with(raw);
+        }
         if raw.is_beside {
             return self.take_beside(raw);
         }
@@ -400,15 +411,42 @@ impl Estimator {
 
     /// A payload that could not be decoded stood here in the stream.
     pub fn take_undecodable(&mut self) {
+        self.note(|| Event::Undecodable);
         self.conditioner.push_undecodable(1);
     }
 
     /// The attitudes that are known by now. Their bits do not depend on when they are asked for.
     pub fn attitudes(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
-        self.out.clear();
-        self.propagate(exec);
+        self.make(exec);
+        std::mem::swap(&mut self.out, &mut self.before);
+        if let Some(open) = &mut self.open {
+            open.note_out(&self.out);
+        }
         self.asked.apply(&mut self.out);
         &self.out
+    }
+
+    /// Makes the attitudes that are known by now, for the next that asks.
+    pub(super) fn make(&mut self, exec: &impl Executor) {
+        self.out.clear();
+        self.propagate(exec);
+        if self.left_until.is_some() {
+            self.leave_out_what_left();
+        }
+        match self.before.is_empty() {
+            true => std::mem::swap(&mut self.out, &mut self.before),
+            false => self.before.append(&mut self.out),
+        }
+    }
+
+    /// Watches sensors and keeps innovations where the one before did, from the first sample on.
+    pub(super) fn watch_as(&mut self, before: &Estimator, resolved: &Meaning, prepared: &Prepared) {
+        if before.watch.is_some() {
+            self.watch_sensors(resolved, prepared);
+        }
+        if before.integrator.keeps_innovations() {
+            self.keep_innovations();
+        }
     }
 
     /// Gives back the memory that only many samples at once need: one of many sensors waits for its next ones.
@@ -445,9 +483,9 @@ impl Estimator {
         exec: &impl Executor,
         mut take: impl FnMut(&[AttitudeSample]) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.out.clear();
         self.conditioner.finish(&mut self.rates);
-        self.propagate(exec);
+        self.make(exec);
+        std::mem::swap(&mut self.out, &mut self.before);
         if let Some(regulariser) = &mut self.regulariser {
             regulariser.finish(&mut self.even);
             self.integrator.push(&self.even, exec, &mut self.out);
@@ -536,6 +574,18 @@ impl Estimator {
         Some(self.magnetometer.as_ref()?.consistency())
     }
 
+    /// Kind for which samples are taken by now, and why.
+    #[must_use]
+    pub fn sample_kind(&self) -> KindChoice {
+        self.sample_kind
+    }
+
+    /// Whether that stays so.
+    #[must_use]
+    pub fn is_kind_decided(&self) -> bool {
+        self.open.is_none()
+    }
+
     /// Report of conditioning.
     #[must_use]
     pub fn conditioning(&self) -> &condition::Report {
@@ -587,56 +637,6 @@ impl Estimator {
     }
 }
 
-/// Output frame of attitudes: in which world, of which instant.
-#[derive(Clone, Copy, Debug)]
-struct OutputFrame {
-    /// Delay of the sensor's own filters, s.
-    delay: f64,
-    world: World,
-    /// True north to the axes of the filter, whose north is magnetic; `None` = the same.
-    north: Option<Quaternion<Nav, Nav>>,
-}
-
-impl OutputFrame {
-    /// Converts from the convention everything is computed in (ENU or start, FLU) to the one asked for: world and
-    /// body change together.
-    fn apply(&self, out: &mut [AttitudeSample]) {
-        let to = self
-            .world
-            .convention()
-            .filter(|to| *to != Convention::EnuFlu);
-        for sample in out {
-            // What a sensor measured late has happened at the stamp already.
-            if self.delay != 0.0 {
-                let turn = sample.rate.held_for(self.delay).about_fixed_axis();
-                sample.q_nb = sample.q_nb.advanced(&turn).normalised();
-            }
-            if let Some(north) = &self.north {
-                sample.q_nb = (*north * sample.q_nb).normalised();
-            }
-            if let Some(to) = to {
-                *sample = relabelled(sample, Convention::EnuFlu, to);
-            }
-        }
-    }
-
-    /// An attitude that was asked for, as it was computed.
-    fn undone(&self, given: &AttitudeSample) -> AttitudeSample {
-        let mut sample = *given;
-        if let Some(from) = self.world.convention() {
-            sample = relabelled(&sample, from, Convention::EnuFlu);
-        }
-        if let Some(north) = &self.north {
-            sample.q_nb = (north.inverse() * sample.q_nb).normalised();
-        }
-        if self.delay != 0.0 {
-            let back = sample.rate.held_for(-self.delay).about_fixed_axis();
-            sample.q_nb = sample.q_nb.advanced(&back).normalised();
-        }
-        sample
-    }
-}
-
 fn conditioning(
     plan: &EstimationSettings,
     resolved: &Meaning,
@@ -652,23 +652,5 @@ fn conditioning(
         coarse: prepared.coarse,
         gyro_range: prepared.gyro_range,
         ..settings
-    }
-}
-
-/// True north in axes whose north is magnetic: what a magnetic attitude is turned by, from the left.
-fn turned_north(declination: f64) -> Quaternion<Nav, Nav> {
-    Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * -declination))
-}
-
-/// The same attitude between other axes: world and body change together.
-fn relabelled(sample: &AttitudeSample, from: Convention, to: Convention) -> AttitudeSample {
-    AttitudeSample {
-        q_nb: from.convert(to, sample.q_nb),
-        rate: BodyRate(from.convert_body(to, sample.rate.0)),
-        covariance: sample.covariance.relabelled(|v| from.convert_body(to, v)),
-        accel: sample
-            .accel
-            .map(|a| In::assume(from.convert_body(to, *a.as_vector()))),
-        ..*sample
     }
 }

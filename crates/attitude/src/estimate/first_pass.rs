@@ -6,6 +6,7 @@
 use super::clock_pass::{SharedStamps, coarse_clock};
 use super::meaning::Meaning;
 use super::plan::EstimationSettings;
+use super::sample_kind::AHEAD;
 use crate::condition::stillness::{Limits, Rests, Stillness};
 use crate::condition::{self, ClockSet, Conditioner, choose_clock_as};
 use crate::diagnostic::Diagnostic;
@@ -13,7 +14,7 @@ use crate::quaternion::BodyRate;
 use crate::record::{Counts, RateSample, RawSample};
 
 /// Samples that tell the clock and hold the first orientation.
-pub const FEW: usize = 512;
+pub const FEW: usize = AHEAD;
 /// Samples in which is sought what nobody asked for, or what cannot be read twice: three minutes at 1 kHz.
 pub(super) const MANY: usize = 200_000;
 
@@ -96,9 +97,10 @@ impl Conditioned {
     fn begin(&mut self) -> Result<(), Diagnostic> {
         let gathered = std::mem::take(&mut self.gathered);
         let (clock, _) = choose_clock_as(&gathered, self.plan.clock, self.plan.stamps);
-        let settings = self
-            .resolved
-            .conditioning(&self.plan, clock, BodyRate::ZERO);
+        let settings =
+            self.resolved
+                .settled(&gathered, clock)
+                .conditioning(&self.plan, clock, BodyRate::ZERO);
         let settings = condition::Settings {
             coarse: coarse_clock(&gathered, clock, settings.repair),
             ..settings

@@ -166,6 +166,10 @@ impl Integrator {
         }
     }
 
+    pub(super) fn keeps_innovations(&self) -> bool {
+        matches!(self, Integrator::Aided(aided) if aided.keeps_innovations())
+    }
+
     pub(super) fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
         match self {
             Integrator::Alone(_) | Integrator::Smoothed(_) => Vec::new(),

@@ -3,6 +3,7 @@
 //! Apart from the preparation because it needs no sample: what is asked for wins over what is declared.
 
 use super::plan::EstimationSettings;
+use super::sample_kind::{AHEAD, KindChoice, KindReason, OrdinaryStep};
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{Clock, GyroUnit, Settings, StampRepair};
 use crate::frames::{AxisMap, Body, BodyAxes, Dcm, In, Nav, Sensor};
@@ -20,8 +21,8 @@ pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 pub struct Meaning {
     /// Kind of a sample.
     pub kind: SampleKind,
-    /// A flag or the format says so.
-    pub(super) is_kind_stated: bool,
+    /// Reason for that kind.
+    pub kind_reason: KindReason,
     /// Unit of the rates.
     pub unit: GyroUnit,
     /// Axes of the input.
@@ -77,14 +78,15 @@ impl Meaning {
         let unit = plan.unit.or(declared.gyro_unit).unwrap_or_default();
         let mount = plan.mount.unwrap_or_else(Quaternion::identity).to_dcm();
         let axes = body.map();
+        let choice = stated_kind(plan, declared);
         Meaning {
             mag_axes: plan
                 .mag_mount
                 .map_or(mount.as_matrix() * axes.matrix(), |q| {
                     *q.to_dcm().as_matrix()
                 }),
-            kind: plan.kind.or(declared.sample_kind).unwrap_or_default(),
-            is_kind_stated: plan.kind.or(declared.sample_kind).is_some(),
+            kind: choice.kind,
+            kind_reason: choice.reason,
             unit,
             accel_scale: scale_of(declared.accel_unit)
                 * if plan.is_accel_kinematic { -1.0 } else { 1.0 },
@@ -99,6 +101,51 @@ impl Meaning {
             mount,
             body,
         }
+    }
+
+    /// Kind of the samples, and why.
+    #[must_use]
+    pub fn kind_choice(&self) -> KindChoice {
+        KindChoice {
+            kind: self.kind,
+            reason: self.kind_reason,
+        }
+    }
+
+    /// The same with samples of this kind.
+    #[must_use]
+    pub fn with_kind(&self, choice: &KindChoice) -> Meaning {
+        Meaning {
+            kind: choice.kind,
+            kind_reason: choice.reason,
+            ..self.clone()
+        }
+    }
+
+    /// Whether nothing has told the kind yet.
+    pub(super) fn is_kind_open(&self) -> bool {
+        self.kind_reason == KindReason::Unknown
+    }
+
+    /// The same with the kind by the ordinary step of the first samples, on their clock, where nothing states it.
+    #[must_use]
+    pub fn settled(&self, first: &[RawSample], clock: Clock) -> Meaning {
+        self.settled_by(first, clock, AHEAD)
+    }
+
+    /// The same by so many steps at most.
+    pub(super) fn settled_by(&self, first: &[RawSample], clock: Clock, most: usize) -> Meaning {
+        if !self.is_kind_open() {
+            return self.clone();
+        }
+        let mut step = OrdinaryStep::of(clock, most);
+        first.iter().take(AHEAD).for_each(|raw| step.take(raw));
+        self.with_kind(&step.choice())
+    }
+
+    /// A recorded rate in rad/s, body axes.
+    pub(super) fn body_rate(&self, recorded: [f64; 3]) -> Vector3<f64> {
+        self.to_body() * self.maps.gyro * Vector3::from(recorded) * self.unit.to_rad()
     }
 
     /// Columns of the input to body axes; a relabelling may mirror.
@@ -173,7 +220,7 @@ impl Meaning {
 
     /// Angle that a recorded sample turned in `secs`.
     pub(super) fn turned(&self, recorded: [f64; 3], secs: f64) -> DeltaAngle {
-        let vector = self.to_body() * self.maps.gyro * Vector3::from(recorded) * self.unit.to_rad();
+        let vector = self.body_rate(recorded);
         match self.kind {
             SampleKind::Rate | SampleKind::Average => BodyRate(vector).held_for(secs),
             SampleKind::DeltaAngle | SampleKind::Rotation => DeltaAngle(vector),
@@ -265,6 +312,19 @@ impl Meaning {
         let q_bs = Quaternion::from_dcm(&self.mount);
         Some((q_ns * q_bs.inverse()).normalised())
     }
+}
+
+/// The kind that is stated: by the user, in the recording, by its format; open where none does.
+fn stated_kind(plan: &EstimationSettings, declared: &Declared) -> KindChoice {
+    let stated = [
+        (plan.kind, KindReason::Setting),
+        (declared.sample_kind, KindReason::Recording),
+        (declared.usual_kind, KindReason::Format),
+    ];
+    let mut told = stated
+        .into_iter()
+        .filter_map(|(kind, reason)| kind.map(|kind| KindChoice { kind, reason }));
+    told.next().unwrap_or(KindChoice::OPEN)
 }
 
 /// The convention of the orientations a format carries.

@@ -32,7 +32,7 @@ pub struct EstimationSettings {
     /// one and `commit` need no later sample. Default: [`Method::Auto`]. Settings `method`, `window`, `order`.
     pub method: Method,
     /// Meaning of a sample in time. Taken wrongly, the attitude is half an interval early or late. Default: `None`, as the
-    /// format states it, else [`SampleKind::Rate`].
+    /// recording states it, else as [`KindReason`](super::KindReason) lists.
     pub kind: Option<SampleKind>,
     /// Unit of the recorded rates. Default: `None`, as the format states it, else rad/s.
     pub unit: Option<GyroUnit>,

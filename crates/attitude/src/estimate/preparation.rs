@@ -4,10 +4,12 @@
 //! seen, and what to say when it cannot be known.
 
 mod bias;
+mod kind;
 mod rates;
 mod stamps;
 
 use self::bias::{decide_bias, looks_for_bias, with_bias_of_rest};
+use self::kind::decide_kind;
 use self::rates::{clipped_at, decide_truncation, looks_for_truncation};
 use self::stamps::{decide_clock, decide_stamps};
 use super::aiding::Aiding;
@@ -15,7 +17,9 @@ use super::class_pass::{self, ClassPass};
 use super::clock_pass::ClockPass;
 use super::first_pass::{FEW, MANY, RestPass};
 use super::meaning::Meaning;
+use super::orientation_lag::LagPass;
 use super::plan::{Aid, Bias, EstimationSettings, Initial, Noise, Truncation};
+use super::sample_kind::KindChoice;
 use super::stamps::{StampPass, Stamps};
 use crate::condition::rails::Rails;
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
@@ -60,6 +64,8 @@ pub struct Prepared {
     pub world_rate: In<Nav>,
     /// The world of the output.
     pub world: World,
+    /// Kind of the samples, and why.
+    pub sample_kind: KindChoice,
     /// Treatment of the stamps.
     pub stamps: Stamps,
     /// Whether log times tell when samples arrived: those of a recording do, those of a daemon are another in every run.
@@ -110,6 +116,8 @@ pub struct Preparation {
     class: Option<ClassPass>,
     /// Whether there are any such forces; before the first sample.
     forces_beside: [bool; 2],
+    /// Rates and orientations of a file that states no kind.
+    lag: Option<LagPass>,
 }
 
 impl Preparation {
@@ -141,6 +149,8 @@ impl Preparation {
             }),
             class: ClassPass::of(plan).filter(|_| patience == Patience::WholeLog),
             forces_beside: [false; 2],
+            lag: LagPass::of(resolved)
+                .filter(|_| patience == Patience::WholeLog && !is_causal(plan)),
         }
     }
 
@@ -180,6 +190,9 @@ impl Preparation {
         }
         if let Some(class) = &mut self.class {
             class.take(raw);
+        }
+        if let Some(lag) = &mut self.lag {
+            lag.take(raw, &self.resolved, self.plan.clock);
         }
         if let Some(clocks) = &mut self.clocks {
             clocks.take(raw);
@@ -222,11 +235,13 @@ impl Preparation {
                 let wants_rest = needs_rest(&self.plan) || self.taken < MANY;
                 let wants_clocks = self.clocks.as_ref().is_some_and(ClockPass::wants_more);
                 let wants_class = self.class.as_ref().is_some_and(ClassPass::wants_more);
+                let wants_lag = self.lag.as_ref().is_some_and(LagPass::wants_more);
                 (self.rest.is_some() && wants_rest)
                     || self.stamps.is_some()
                     || wants_rates
                     || wants_clocks
                     || wants_class
+                    || wants_lag
             }
             Patience::FirstMinute => {
                 if self.clocks.as_ref().is_some_and(ClockPass::wants_more) {
@@ -258,9 +273,12 @@ impl Preparation {
             forces_beside,
             clocks,
             class,
+            lag,
             ..
         } = self;
         let mut warnings = Vec::new();
+        let sample_kind = decide_kind((&plan, &resolved), &first, lag, &mut warnings);
+        let resolved = resolved.with_kind(&sample_kind);
         let clocks = decide_clock((&plan, &resolved), &first, clocks, &mut warnings)?;
         let clock = clocks.clock;
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
@@ -337,6 +355,7 @@ impl Preparation {
         let rates = rates.as_deref().filter(|_| is_wanted);
         let truncation_step = decide_truncation(&plan, rates, &mut warnings)?;
         let mut prepared = Prepared {
+            sample_kind,
             noise: plan.noise.taken(),
             aiding,
             truncation_step,
@@ -451,6 +470,7 @@ pub fn at_once(
         Stamps::AsRecorded
     };
     Ok(Prepared {
+        sample_kind: resolved.kind_choice(),
         has_arrival: false,
         batches: None,
         coarse: None,
@@ -476,6 +496,11 @@ pub fn at_once(
 /// Whether the plan asks for something only rest can tell.
 fn needs_rest(plan: &EstimationSettings) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
+}
+
+/// Whether attitudes are those of a daemon: nothing is decided by later samples.
+pub(super) fn is_causal(plan: &EstimationSettings) -> bool {
+    is_live(plan.method) && !plan.smooth
 }
 
 /// Whether the method waits for nothing, as a daemon.

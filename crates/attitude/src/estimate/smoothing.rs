@@ -25,11 +25,6 @@ use std::num::NonZero;
 /// Time put between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
 const APART: i64 = 10_000_000_000;
 
-/// Steps no longer than this, ns, hardly tell a rate at its stamp from a mean since the one before; sensors' own
-/// filters make them late by more than half a step.
-const SHORT: i64 = 5_000_000;
-/// Steps that are looked at.
-const FEW: usize = 4096;
 /// Samples that are handed on at once.
 const CHUNK: usize = 4096;
 
@@ -38,8 +33,6 @@ const CHUNK: usize = 4096;
 pub(super) struct SmoothingInputs {
     /// Kind of a sample.
     pub(super) kind: SampleKind,
-    /// Somebody said so.
-    pub(super) is_kind_stated: bool,
     /// Heading of the first attitude, rad; `None`: that of the smoother.
     pub(super) heading: Option<f64>,
     /// Ratio of this sensor's errors to those of the default class.
@@ -60,9 +53,6 @@ pub(super) struct Smoothing {
     /// The same before the first sample.
     fresh: AidedPropagator,
     kept: SampleStore,
-    /// The first steps, ns, and the last stamp.
-    steps: Vec<i64>,
-    last: Option<Nanos>,
     /// Gyro held against the field, for iron beyond what a smoother's priors allow.
     fields: (VectorPairing, FieldConsistency),
     told: SmoothingInputs,
@@ -75,8 +65,6 @@ pub(super) struct Smoothing {
 pub struct Recording {
     /// Result; never [`Outcome::Filter`].
     pub smoothed: Smoothed,
-    /// Nobody said what a sample means, and in steps of 5 ms and less they were taken as means since the one before.
-    pub is_taken_as_mean: bool,
     /// The sensor is farther off than those of its class, and was smoothed again with the priors of one that nobody
     /// calibrated.
     pub is_beyond_class: bool,
@@ -203,8 +191,6 @@ impl Smoothing {
             fresh: aided.clone(),
             aided,
             kept: SampleStore::default(),
-            steps: Vec::new(),
-            last: None,
             fields: (VectorPairing::with_repeats(), FieldConsistency::default()),
             told,
             result: None,
@@ -247,11 +233,6 @@ impl Smoothing {
         for rate in rates {
             self.kept.push(&Event::Rate(*rate));
             self.watch_field(rate);
-            if let Some(last) = self.last.replace(rate.stamp)
-                && self.steps.len() < FEW
-            {
-                self.steps.push(rate.stamp.since(last));
-            }
         }
         self.aided.push(rates, scratch);
         scratch.clear();
@@ -331,13 +312,6 @@ impl Smoothing {
         }
     }
 
-    /// The median of the first steps, ns.
-    fn step(&self) -> Option<i64> {
-        let mut steps = self.steps.clone();
-        steps.sort_unstable();
-        steps.get(steps.len() / 2).copied()
-    }
-
     /// Smooths it.
     ///
     /// # Errors
@@ -347,11 +321,8 @@ impl Smoothing {
         threads: usize,
         iron: Option<FieldIron>,
     ) -> Result<Result<Recording, Diagnostic>, SmoothError<SpoolError>> {
-        let is_taken_as_mean = self.told.kind == SampleKind::Rate
-            && !self.told.is_kind_stated
-            && self.step().is_some_and(|step| step <= SHORT);
         let sample_model = match self.told.kind {
-            SampleKind::Rate if !is_taken_as_mean => SampleModel::Instant,
+            SampleKind::Rate => SampleModel::Instant,
             _ => SampleModel::Interval,
         };
         let mut known = self.told.known;
@@ -388,7 +359,6 @@ impl Smoothing {
         Ok(Ok(Recording {
             is_beyond_class: again.is_some(),
             smoothed: again.unwrap_or(smoothed),
-            is_taken_as_mean,
             spooled_bytes: self.kept.spooled_bytes(),
             iron,
             sizes: Vec::new(),
@@ -557,7 +527,6 @@ mod tests {
             aided(),
             SmoothingInputs {
                 kind: SampleKind::Rate,
-                is_kind_stated: true,
                 heading: None,
                 bias_sigma: BIAS_SIGMA,
                 gyro_range: 0.0,

@@ -6,6 +6,7 @@
 use super::first_pass::{Conditioned, FEW};
 use super::meaning::Meaning;
 use super::plan::EstimationSettings;
+use super::sample_kind::{KindChoice, KindReason};
 use crate::condition::regularise::{Lines, Regulariser, Survey, Value};
 use crate::diagnostic::Diagnostic;
 use crate::record::{RawSample, SampleKind};
@@ -104,10 +105,12 @@ impl StampPass {
             return None;
         }
         let mut surveys: Vec<(SampleKind, Conditioned, Survey)> = Vec::new();
-        for kind in std::iter::once(meaning.kind).chain(others) {
+        // Which of the two it is, the samples tell.
+        let either = meaning.is_kind_open().then_some(SampleKind::Average);
+        for kind in std::iter::once(meaning.kind).chain(either).chain(others) {
             if surveys.iter().all(|(known, ..)| *known != kind) {
-                let mut meant = meaning.clone();
-                meant.kind = kind;
+                let reason = KindReason::Setting;
+                let meant = meaning.with_kind(&KindChoice { kind, reason });
                 surveys.push((kind, Conditioned::new(plan, &meant), Survey::new()));
             }
         }

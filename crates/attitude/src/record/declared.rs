@@ -55,6 +55,8 @@ pub enum AccelUnit {
 pub struct Declared {
     /// Meaning of a sample in time.
     pub sample_kind: Option<SampleKind>,
+    /// Meaning that samples of this format's sensors usually have, where nothing in it states one.
+    pub usual_kind: Option<SampleKind>,
     /// Unit of the body rate.
     pub gyro_unit: Option<GyroUnit>,
     /// Unit of the specific force.

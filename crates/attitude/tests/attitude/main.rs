@@ -8,6 +8,7 @@ mod conventions;
 mod covariance;
 mod properties;
 mod rests;
+mod sample_kind;
 mod sensor_error;
 mod settings;
 #[path = "../../../../tests/shared_data/mod.rs"]

@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::EstimationSettings;
-use strapd_attitude::record::Nanos;
+use strapd_attitude::record::{Nanos, SampleKind};
+use strapd_attitude::setting::SAMPLE_KIND;
 
 /// Decoders under the same options. The schemas of a log together are compiled within one fixed effort, however many.
 #[derive(Debug, Default)]
@@ -104,8 +105,12 @@ impl Decoders {
             ..self.options.clone()
         };
         let plain = plain(channel);
+        // As `strapd simulate` writes it: no field of a message says what a sample is.
+        let kind = channel.metadata.get(SAMPLE_KIND.name());
+        let kind = kind.and_then(|name| SampleKind::named(name));
         let Some(schema) = &channel.schema else {
-            return Decoder::compile_within(&plain, &options, &mut self.effort);
+            let made = Decoder::compile_within(&plain, &options, &mut self.effort)?;
+            return Ok(made.of_topic(&channel.topic).stating(kind));
         };
         let encoding = channel.message_encoding.clone();
         let key = (Arc::as_ptr(schema) as usize, encoding, nth);
@@ -115,7 +120,7 @@ impl Decoders {
             decoder: Decoder::compile_within(&plain, &options, effort),
         });
         match &known.decoder {
-            Ok(decoder) => Ok(decoder.of_topic(&channel.topic)),
+            Ok(decoder) => Ok(decoder.of_topic(&channel.topic).stating(kind)),
             Err(why) => Err(Unsupported {
                 topic: crate::text::printable(&channel.topic),
                 ..why.clone()

@@ -9,6 +9,8 @@ use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
 use serde_json::json;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
+use strapd_attitude::estimate::KindReason;
+use strapd_attitude::record::SampleKind;
 use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND};
 
 /// A meaning is better when its median error is below this share of the other's.
@@ -42,9 +44,7 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         return;
     };
     let Some(recorded) = &summary.recorded else {
-        if !topic.looked.kind_stated {
-            out.push(meaning_unknown());
-        }
+        out.extend(meaning_unknown(summary));
         return;
     };
     let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
@@ -56,8 +56,7 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     let used = summary.kind.name();
     match best_meaning(&summary.against) {
         Some(best) if trusted => meaning(&summary.against, best, used, out),
-        _ if !topic.looked.kind_stated => out.push(meaning_unknown()),
-        _ => {}
+        _ => out.extend(meaning_unknown(summary)),
     }
     if trusted {
         let at_rest = topic.looked.bias.as_ref().map(|found| found.bias.0);
@@ -190,14 +189,27 @@ fn bias_explains(recorded: &Recorded) -> bool {
     })
 }
 
-fn meaning_unknown() -> Finding {
-    Finding::new(
-        Severity::Note,
-        "sample-kind-unknown",
-        "nothing says whether a sample is the rate at its stamp or the mean over its interval; it is taken as the rate",
+/// Note that the ordinary step alone has decided what a sample is.
+fn meaning_unknown(summary: &TopicSummary) -> Option<Finding> {
+    let (KindReason::Step(_) | KindReason::Unknown) = summary.kind_reason else {
+        return None;
+    };
+    let taken = match summary.kind {
+        SampleKind::Average => "mean",
+        _ => "rate",
+    };
+    Some(
+        Finding::new(
+            Severity::Note,
+            "sample-kind-unknown",
+            format!(
+                "{}; whether a sample is the rate at its stamp or the mean over its interval is not said, it is taken as the {taken}",
+                summary.kind_reason
+            ),
+        )
+        .advise("the sensor's manual says it; it matters more than the integrator")
+        .help([SAMPLE_KIND.to("rate|average|delta-angle")]),
     )
-    .advise("the sensor's manual says it; it matters more than the integrator")
-    .help([SAMPLE_KIND.to("rate|average|delta-angle")])
 }
 
 fn best_meaning(rows: &[Against]) -> Option<&Against> {

@@ -11,7 +11,9 @@ use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Stillness};
 use strapd_attitude::condition::{Clock, GyroUnit, choose_clock_as};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{ClockPass, Conditioned, EstimationSettings, FEW, Meaning};
+use strapd_attitude::estimate::{
+    ClockPass, Conditioned, EstimationSettings, FEW, LagPass, Meaning,
+};
 use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
 use strapd_recording::decode::Options;
@@ -44,7 +46,8 @@ struct TopicInspector {
     of: String,
     described: PayloadType,
     frame: String,
-    kind_stated: bool,
+    /// Pass that finds the kind by an orientation in the samples.
+    lag: Option<LagPass>,
     resolved: Meaning,
     first: Vec<RawSample>,
     /// The first of other sensors than the gyro.
@@ -103,6 +106,9 @@ impl TopicInspector {
         if let Some(clocks) = &mut self.clocks {
             clocks.take(raw);
         }
+        if let Some(lag) = &mut self.lag {
+            lag.take(raw, &self.resolved, self.asked);
+        }
         self.conditioned.push(std::slice::from_ref(raw), |sample| {
             self.stillness.push(sample);
             self.stamps.push(sample);
@@ -121,6 +127,7 @@ impl TopicInspector {
 
     fn settle(&mut self) {
         let (clock, warning) = choose_clock_as(&self.first, self.asked, self.plan.stamps);
+        self.resolved = self.resolved.settled(&self.first, clock);
         self.quality = Quality::new(clock);
         self.aid = Aids::of(&self.plan, &self.resolved, &self.first, &self.beside);
         for raw in self.first.drain(..) {
@@ -138,6 +145,9 @@ impl TopicInspector {
             self.stillness.push(sample);
             self.stamps.push(sample);
         })?;
+        if let Some(choice) = self.lag.take().and_then(|lag| lag.choice()) {
+            self.resolved = self.resolved.with_kind(&choice);
+        }
         let rests = self.stillness.finish();
         let mut counts = self.conditioned.counts();
         counts.add_many(Verdict::Undecodable, self.undecodable);
@@ -152,7 +162,6 @@ impl TopicInspector {
             described: self.described,
             frame: self.frame,
             resolved: self.resolved,
-            kind_stated: self.kind_stated,
             quality,
             quality_unit: self.si.unit,
             bias: stillness::estimate_bias(&rests, &Limits::default()).ok(),
@@ -332,7 +341,7 @@ fn begin(of_topic: &TopicPlan<'_>, plan: &EstimationSettings) -> Option<TopicIns
         of: of_topic.source.topic.clone(),
         described: described(&known.channel),
         frame: of_topic.frame(),
-        kind_stated: decoder.stated().declared.sample_kind.is_some(),
+        lag: LagPass::of(&resolved),
         first: Vec::new(),
         beside: Vec::new(),
         clock: None,

@@ -14,7 +14,9 @@ use strapd_attitude::compare::{
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{EstimationSettings, Initial, Meaning, Prepared};
+use strapd_attitude::estimate::{
+    EstimationSettings, Initial, KindChoice, KindReason, Meaning, Prepared,
+};
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status};
@@ -159,8 +161,10 @@ impl AgainstRecorded {
                     method: method.unwrap_or(plan.method),
                     ..plan.clone()
                 };
-                let mut resolved = resolved.clone();
-                resolved.kind = among_tried(*kind, resolved.kind);
+                let resolved = resolved.with_kind(&KindChoice {
+                    kind: among_tried(*kind, resolved.kind),
+                    reason: KindReason::Setting,
+                });
                 Estimator::new(&plan, &resolved, &prepared)
             })
             .collect::<Result<Vec<_>, _>>()?;

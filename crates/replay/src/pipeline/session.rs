@@ -144,14 +144,15 @@ impl Topic {
             topic: found.name.clone(),
             what,
         };
-        let mut estimator = Estimator::new(plan, &found.resolved, &prepared).map_err(refuse)?;
-        estimator.watch_sensors(&found.resolved, &prepared);
+        // What nothing stated, the preparation has found out.
+        let resolved = found.resolved.with_kind(&prepared.sample_kind);
+        let mut estimator = Estimator::new(plan, &resolved, &prepared).map_err(refuse)?;
+        estimator.watch_sensors(&resolved, &prepared);
         let against = against
-            .then(|| AgainstRecorded::new(plan, &found.resolved, &prepared))
+            .then(|| AgainstRecorded::new(plan, &resolved, &prepared))
             .transpose()
             .map_err(refuse)?;
-        let field =
-            (plan.aid == Aid::GravityAndField).then(|| FieldWatch::new(found.resolved.kind));
+        let field = (plan.aid == Aid::GravityAndField).then(|| FieldWatch::new(resolved.kind));
         let mut warnings = found.warnings;
         let known = plan.calibration.as_deref();
         let mismatch = known.and_then(|known| known.mismatch(&found.name));
@@ -160,7 +161,7 @@ impl Topic {
             name: found.name,
             output_topic: found.output_topic,
             described: found.described,
-            resolved: found.resolved,
+            resolved,
             prepared,
             noticed: found.noticed,
             warnings,

@@ -24,8 +24,8 @@ use messages::{CdrMessages, JsonMessages, Messages, SampleMessages, TruthMessage
 use std::collections::BTreeMap;
 use std::io;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::record::Nanos;
-use strapd_attitude::setting::{COPY_INPUT, ENCODING};
+use strapd_attitude::record::{Nanos, SampleKind};
+use strapd_attitude::setting::{COPY_INPUT, ENCODING, SAMPLE_KIND};
 
 /// Encoding of messages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -163,8 +163,12 @@ impl Layout {
         provenance: &Provenance,
     ) -> Result<Layout> {
         let metadata = push_head(file, out, encoding, provenance);
-        let mut declare = |topic: &str, schema: [&str; 3]| {
+        let mut declare = |topic: &str, schema: [&str; 3], kind: Option<SampleKind>| {
             let [name, form, text] = schema;
+            let mut metadata = metadata.clone();
+            // For whoever reads them: no field of a message says what a sample is.
+            metadata
+                .extend(kind.map(|kind| (SAMPLE_KIND.name().to_owned(), kind.name().to_owned())));
             file.schema(out, name, form, text.as_bytes())
                 .and_then(|id| file.channel(out, id, topic, encoding.name(), &metadata))
                 .ok_or_else(too_many_channels)
@@ -182,7 +186,7 @@ impl Layout {
         };
         let topics = Declared::of(streams, encoding, attitude_schema, &mut declare)?;
         let transform = if streams.iter().any(|s| s.content == Content::Attitude) {
-            declare(TF_TOPIC, transform_schema)?
+            declare(TF_TOPIC, transform_schema, None)?
         } else {
             0
         };
@@ -221,30 +225,34 @@ impl Declared {
         streams: &[Stream],
         encoding: Encoding,
         attitude_schema: [&str; 3],
-        declare: &mut dyn FnMut(&str, [&str; 3]) -> Result<u16>,
+        declare: &mut dyn FnMut(&str, [&str; 3], Option<SampleKind>) -> Result<u16>,
     ) -> Result<Vec<Declared>> {
         let mut all = Vec::new();
         for stream in streams {
-            let schema = match stream.content {
-                Content::Attitude => attitude_schema,
+            let (schema, kind) = match stream.content {
+                Content::Attitude => (attitude_schema, None),
                 _ if encoding == Encoding::Json => return Err(only_attitudes_are_json()),
-                Content::Samples(_) => IMU_SCHEMA,
-                Content::Truth => QUATERNION_SCHEMA,
+                Content::Samples(kind) => (IMU_SCHEMA, Some(kind)),
+                Content::Truth => (QUATERNION_SCHEMA, None),
             };
             all.push(Declared {
-                main: declare(&stream.output_topic, schema)?,
+                main: declare(&stream.output_topic, schema, kind)?,
                 rate: 0,
                 field: None,
             });
         }
         for (stream, own) in streams.iter().zip(&mut all) {
             if stream.content == Content::Truth {
-                own.rate = declare(&format!("{}/rate", stream.output_topic), VECTOR_SCHEMA)?;
+                own.rate = declare(
+                    &format!("{}/rate", stream.output_topic),
+                    VECTOR_SCHEMA,
+                    None,
+                )?;
             }
         }
         for (stream, own) in streams.iter().zip(&mut all) {
             if let (Content::Samples(_), Some(topic)) = (&stream.content, &stream.field_topic) {
-                own.field = Some(declare(topic, FIELD_SCHEMA)?);
+                own.field = Some(declare(topic, FIELD_SCHEMA, None)?);
             }
         }
         Ok(all)

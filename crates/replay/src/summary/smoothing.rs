@@ -4,7 +4,7 @@ use super::significant;
 use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
-use strapd_attitude::setting::{NOISE, SAMPLE_KIND, SMOOTH};
+use strapd_attitude::setting::{NOISE, SMOOTH};
 use strapd_attitude::smooth::{Bias, Calibration, Counts, Estimated, HeldBias, Outcome, Sizes};
 
 /// A recording that was smoothed.
@@ -24,7 +24,6 @@ pub struct Smoothing {
     bound: [f64; 2],
     /// The bias that no motion told.
     held: Option<HeldBias>,
-    is_taken_as_mean: bool,
     is_beyond_class: bool,
     spooled_bytes: u64,
     sizes: Vec<Sizes>,
@@ -112,7 +111,6 @@ impl Smoothing {
             has_north: smoothed.sections().iter().any(|section| section.has_north),
             bound: smoothed.bound(),
             held: smoothed.held(),
-            is_taken_as_mean: recording.is_taken_as_mean,
             is_beyond_class: recording.is_beyond_class,
             spooled_bytes: recording.spooled_bytes,
             sizes: recording.sizes.clone(),
@@ -133,15 +131,10 @@ impl Smoothing {
         ]
     }
 
-    /// Text of what integrated, and for what it took a sample if nobody stated that.
+    /// Name of what integrated.
     #[must_use]
     pub fn method(&self) -> String {
-        match self.is_taken_as_mean {
-            true => {
-                format!("smoothed; in steps of at most 5 ms ({SAMPLE_KIND} rate: at their stamps)")
-            }
-            false => "smoothed".to_owned(),
-        }
+        "smoothed".to_owned()
     }
 
     /// Lines for people: what was done, then what was learned.

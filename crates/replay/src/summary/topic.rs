@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 use strapd_attitude::condition::{ClockSet, Wraps};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{
-    EstimationSettings, Estimator, Meaning, Prepared, SensorCalibration, learned,
+    EstimationSettings, Estimator, KindReason, Meaning, Prepared, SensorCalibration, learned,
 };
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::Method;
@@ -60,6 +60,8 @@ pub struct TopicSummary {
     pub stamps: Option<Regularised>,
     /// Kind for which a sample was taken.
     pub kind: SampleKind,
+    /// Reason for that kind.
+    pub kind_reason: KindReason,
     /// The integrator in words.
     pub method: String,
     /// Axes of the recorded numbers.
@@ -143,6 +145,7 @@ impl TopicSummary {
             result.map_err(Diagnostic::clone)
         });
         let gaps = Gaps::of(conditioning, &propagation);
+        let choice = estimator.sample_kind();
         TopicSummary {
             counts: conditioning.counts,
             duration_secs: conditioning.duration_nanos() as f64 * 1e-9,
@@ -157,13 +160,11 @@ impl TopicSummary {
             stamps: estimator
                 .regularising()
                 .map(|(causal, report)| Regularised::of(causal, &report, first)),
-            kind: match recording {
-                Some(recording) if recording.is_taken_as_mean => SampleKind::Average,
-                _ => resolved.kind,
-            },
+            kind: choice.kind,
+            kind_reason: choice.reason,
             method: match &smoothed {
                 Some(Ok(smoothing)) => smoothing.method(),
-                _ => method_words(estimator.method(), resolved.kind),
+                _ => method_words(estimator.method(), choice.kind),
             },
             body,
             world,
@@ -243,9 +244,15 @@ impl TopicSummary {
             )
             .told("stamps", self.stamps.as_ref().map(Regularised::text)),
             Row::value("sample_kind", self.kind.name()),
+            Row::value("sample_kind_by", self.kind_reason.name()),
             Row::value("method", self.method.as_str()).told(
                 "method",
-                [format!("{}; {}", self.method, meaning(self.kind))],
+                [format!(
+                    "{}; {} ({})",
+                    self.method,
+                    meaning(self.kind),
+                    self.kind_reason
+                )],
             ),
             Row::value("input_axes", self.input_axes.as_str()),
             Row::value("sensor_maps", self.sensor_maps.as_deref())

@@ -147,7 +147,7 @@ pub static ROWS: [Row; 36] = [
         setting: SAMPLE_KIND,
         meaning: "Meaning of a sample in time",
         effect: "It matters more than the order of the method: a mean taken for a rate is half an interval late.",
-        default: Default::Unset("rate, unless the format says otherwise"),
+        default: Default::Unset("as the recording or its format states; else by an orientation in the samples (files); else average where the ordinary step is at most 20 ms, and rate above"),
         environment: Some("STRAPD_SAMPLE_KIND"),
         placeholder: "SAMPLE_KIND",
         words: &[

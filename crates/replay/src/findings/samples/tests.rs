@@ -34,7 +34,6 @@ fn looked(raw: &[RawSample]) -> Inspection {
         described: PayloadType::of_memory("imu [cdr]"),
         frame: String::new(),
         resolved: Meaning::new(&EstimationSettings::default(), &Declared::default()),
-        kind_stated: true,
         quality: quality.summary(),
         quality_unit: GyroUnit::Rad,
         rests: Default::default(),
