@@ -570,9 +570,7 @@ fn unpacked_sample(object: &[u8], label: &Value) -> Value {
     if object.len() > 72 {
         line["dt_ns"] = u64_at(object, 72).cast_signed().into();
     }
-    if label["sample_kind"] != "rate" {
-        line["sample_kind"] = label["sample_kind"].clone();
-    }
+    line["sample_kind"] = label["sample_kind"].clone();
     line
 }
 

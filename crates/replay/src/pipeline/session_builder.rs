@@ -21,6 +21,8 @@ pub fn labelled(
     prepared: &Prepared,
 ) -> Stream {
     let (world, body) = resolved.labels(prepared.world);
+    let kind = resolved.kind_choice();
+    stream.input_kind = kind.reason.is_stated().then_some(kind.kind);
     stream.world_axes = world;
     stream.body_axes = body;
     if resolved.is_remapped(plan, prepared.world) {

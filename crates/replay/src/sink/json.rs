@@ -107,11 +107,9 @@ impl RateObject {
         let mut head = b"{\"class\":\"RATE\",\"id\":".to_vec();
         push_string(&mut head, &stream.id);
         head.extend_from_slice(b",\"seq\":");
-        let mut named = Vec::new();
-        if kind != SampleKind::default() {
-            named.extend_from_slice(b",\"sample_kind\":");
-            push_string(&mut named, kind.name());
-        }
+        // Always: without it a reader goes by the step.
+        let mut named = b",\"sample_kind\":".to_vec();
+        push_string(&mut named, kind.name());
         RateObject { head, kind: named }
     }
 

@@ -36,6 +36,8 @@ pub struct Stream {
     pub id: String,
     /// Topic from which the samples came.
     pub input_topic: String,
+    /// Kind of those samples, where somebody states it.
+    pub input_kind: Option<SampleKind>,
     /// Topic of the attitude ([`output_topic`]).
     pub output_topic: String,
     /// Topic of the magnetic field that samples carry; `None`: no channel is declared for it.
@@ -60,6 +62,7 @@ impl Stream {
             content: Content::Attitude,
             id: input_topic.to_owned(),
             input_topic: input_topic.to_owned(),
+            input_kind: None,
             output_topic: output_topic(input_topic, &BTreeSet::new()),
             field_topic: None,
             frame_id: frame_id.to_owned(),
@@ -76,6 +79,7 @@ impl Stream {
             content: self.content,
             id: bounded(&self.id),
             input_topic: bounded(&self.input_topic),
+            input_kind: self.input_kind,
             output_topic: bounded(&self.output_topic),
             field_topic: self.field_topic.as_deref().map(bounded),
             frame_id: bounded(&self.frame_id),

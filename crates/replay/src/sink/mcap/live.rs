@@ -15,6 +15,7 @@ use crate::sink::stream::{ChildFrames, named_frame, parent_frame};
 use std::collections::BTreeMap;
 use std::path::Path;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::setting::SAMPLE_KIND;
 
 /// A stream of the recording.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -93,7 +94,10 @@ impl LiveMcap {
     /// [`Error::Usage`] when there are more than MCAP can number.
     pub fn stream(&mut self, stream: &Stream) -> Result<LiveStream> {
         let stream = stream.bounded();
-        let input = self.declare(&stream.input_topic, IMU_SCHEMA, &[])?;
+        let kind = stream
+            .input_kind
+            .map(|kind| (SAMPLE_KIND.name(), kind.name()));
+        let input = self.declare(&stream.input_topic, IMU_SCHEMA, kind.as_slice())?;
         let axes = [
             ("rotates", stream.rotates.as_str()),
             ("world", &stream.world_axes),
