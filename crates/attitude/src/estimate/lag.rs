@@ -1,4 +1,4 @@
-//! How far rates are behind an orientation -> what a sample means, and the delay beside that. Pure.
+//! Delay of rates behind an orientation -> what a sample means, and the delay beside that. Pure.
 //!
 //! Apart from the fit that finds it, which needs samples: the reason for a kind is told by this alone.
 

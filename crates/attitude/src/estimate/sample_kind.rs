@@ -1,4 +1,4 @@
-//! What was stated, the format, an orientation, the ordinary step -> what a sample means. Pure.
+//! Statement, format, orientation, ordinary step -> what a sample means. Pure.
 //!
 //! One rule for files, streams, arrays and daemon (`docs/theory/clocks.md`, "What a sample means"): apart from the
 //! meaning of a sample because everything else in that is stated, and this may be found in the samples.
@@ -20,7 +20,7 @@ const OVER_A_GAP: f64 = 1.75;
 const NO_STEP: i64 = 20;
 /// Steps from which it is seen that samples come in batches, or several on one stamp: then the mean step counts.
 const BATCHED: usize = 12;
-/// Such a step is below this share of the mean, and so many of all are.
+/// Share of the mean below which a step is short, and share of short steps from which samples come in batches.
 const SHORT: f64 = 0.3;
 const SHORT_SHARE: f64 = 0.4;
 
