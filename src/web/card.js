@@ -9,7 +9,7 @@ import { drawPlot } from "./plot.js";
 import { aboutZ, DEGREES, product, rollPitchYaw, rotate } from "./quaternion.js";
 import { Scale } from "./scale.js";
 import { Surface } from "./surface.js";
-import { writeHealth, writeNumbers } from "./writing.js";
+import { writeDoubts, writeHealth, writeNumbers } from "./writing.js";
 
 // Seconds of the path of the z axis.
 const LOCUS = 10;
@@ -273,6 +273,7 @@ export class Card {
   // The source as STATUS tells of it.
   tell(source, before, seconds) {
     writeHealth(this, source, before, seconds);
+    writeDoubts(this.parts.doubts, source.findings ?? []);
     this.known.tell(source);
     if (!this.parts.known.hidden) this.moved();
   }

@@ -1,12 +1,15 @@
 // What a card says in words and numbers.
 
 import { clockTime } from "./clock.js";
-import { fixed, measure, say, SECONDS, show, whole } from "./numbers.js";
+import { fixed, measure, plain, say, SECONDS, show, whole } from "./numbers.js";
 import { rollPitchYaw } from "./quaternion.js";
 import { taken } from "./sensor.js";
 
 // What a status may say without a need to be looked at.
 const USUAL = new Set(["ok", "provisional", "aided", "rest"]);
+
+// Findings that a card shows: more are in STATUS.
+const DOUBTS = 3;
 
 // Of the newest, as it came; of an instant that is looked at, what was kept of it.
 function moment({ sensor, held }) {
@@ -105,4 +108,24 @@ export function writeHealth({ parts, sensor }, source, before, seconds) {
     say(parts[name], text ?? "–");
     parts[name].closest("div").hidden = text === undefined;
   }
+}
+
+// What is wrong with the samples, and what helps: the worst first, as STATUS has them.
+export function writeDoubts(list, findings) {
+  const shown = findings.filter(({ severity }) => severity !== "note").slice(0, DOUBTS);
+  list.hidden = shown.length === 0;
+  const written = JSON.stringify(shown.map(({ code, what }) => [code, what]));
+  if (list.dataset.written === written) return;
+  list.dataset.written = written;
+  list.replaceChildren(
+    ...shown.map(({ severity, what, advice, flags }) => {
+      const item = document.createElement("li");
+      item.classList.toggle("bad", severity === "error");
+      const [title, help] = ["b", "span"].map((tag) => document.createElement(tag));
+      say(title, plain(what));
+      say(help, plain(flags ? `${advice}: ${flags}` : advice));
+      item.append(title, help);
+      return item;
+    }),
+  );
 }

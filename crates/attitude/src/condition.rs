@@ -40,6 +40,7 @@
 
 mod clock;
 mod follow;
+mod frozen;
 mod gate;
 mod histogram;
 mod memory;
@@ -71,7 +72,7 @@ pub use settings::{OnGap, Settings, SettingsError};
 pub use spikes::SpikeCount;
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
-use clock::{BatchLine, ClockSteps, IndexClock, Turns};
+use clock::{BatchLearner, BatchLine, ClockSteps, IndexClock, Turns};
 use gate::{Gate, MAX_STAMP};
 use order::Order;
 use spikes::Spikes;
@@ -109,6 +110,10 @@ pub struct Conditioner {
     is_compared: bool,
     /// Line on which samples of batches lie.
     batch_line: Option<BatchLine>,
+    /// Looks for batches in a stream of which nothing waits.
+    batch_learner: Option<BatchLearner>,
+    /// Looks for spikes in the samples that have left, where none waits for its successors.
+    passed: Option<spikes::Passed>,
     /// A first sample with stamp zero, until the second tells whether that can be.
     zero: Option<(RawSample, u64)>,
     state: State,
@@ -146,6 +151,10 @@ impl Conditioner {
         let max_gap_nanos = secs_to_nanos(settings.max_gap_secs);
         let window = settings.reorder_window;
         let batch_line = settings.batches.as_ref().map(BatchLine::new);
+        let is_followed =
+            settings.repair == StampRepair::Auto && !matches!(settings.clock, Clock::Index { .. });
+        let is_rate = matches!(settings.kind, SampleKind::Rate | SampleKind::Average);
+        let is_live = is_followed && is_rate && window == 0;
         let mut timing = Timing::new(settings, max_gap_nanos);
         if let Some(line) = &batch_line {
             timing.expect(line.step());
@@ -173,6 +182,8 @@ impl Conditioner {
                 (window, _) => window.max(PRIMING),
             },
             primed: batch_line.is_some() || settings.coarse.is_some(),
+            batch_learner: (is_live && batch_line.is_none()).then(BatchLearner::default),
+            passed: spikes::Passed::of(settings),
             batch_line,
             finishing: false,
             trim: (settings.start.is_some() || settings.until.is_some()).then(|| {
@@ -181,14 +192,13 @@ impl Conditioner {
                     settings.until.map_or(i64::MAX, secs_to_nanos),
                 )
             }),
-            is_followed: settings.repair == StampRepair::Auto
-                && !matches!(settings.clock, Clock::Index { .. }),
+            is_followed,
             is_compared: settings.repair == StampRepair::Auto
                 && settings.has_arrival
                 && matches!(settings.clock, Clock::Header),
             zero: None,
             state: State::default(),
-            report: Report::default(),
+            report: Report::of_batches(settings.batches.filter(|_| window == 0)),
         })
     }
 
@@ -282,6 +292,11 @@ impl Conditioner {
                 }
                 if raw.accel.is_some() && gate::finite_accel(&entry.accel).is_none() {
                     self.report.accel_dropped += 1;
+                }
+                if let Some(learner) = &mut self.batch_learner
+                    && let Some(rate) = learner.push(entry.stamp.0, entry.value.into())
+                {
+                    self.lie_on_line(&rate);
                 }
                 self.order.arrive(entry, spacing, &mut self.report);
                 self.drain(out);
@@ -385,6 +400,10 @@ impl Conditioner {
                 spikes.repaired(entry, ahead, steps, &mut self.report.spikes)
             });
             let entry = repaired.as_ref().unwrap_or(entry);
+            if let Some(passed) = &mut self.passed {
+                let steps = (self.timing.spacing(), self.timing.coarse());
+                passed.take(entry, steps, &mut self.report.spikes_left);
+            }
             out.push(self.timing.one(entry, stamp, ahead, &mut self.report));
             match timing::verdict(entry.status) {
                 Verdict::Accepted => self.report.counts.add(Verdict::Accepted),

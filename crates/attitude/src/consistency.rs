@@ -52,6 +52,10 @@ const GATE_BACK: usize = 3;
 const REFINED_BY: usize = 32;
 /// Segments in a row for which a verdict holds before it is said.
 const HOLD: usize = 3;
+/// Segments after which the bank of a live stream closes, if the last ones do not scatter and nothing was found.
+const OPEN_LEAST: usize = 64;
+/// Segments that move, without a bank, after which a live stream counts as sound.
+const SOUND_LEAST: usize = 32;
 
 /// A rate with the force that belongs to it, in the axes of the sensor.
 #[derive(Clone, Copy, Debug)]
@@ -113,6 +117,11 @@ pub struct Consistency {
     bank: Option<Evidence>,
     held: usize,
     settled: Option<Verdict>,
+    /// Whether it runs beside a stream without an end: it keeps no segment that does not scatter, and closes a bank
+    /// that finds nothing.
+    is_live: bool,
+    /// Segments that moved since the bank was opened or closed.
+    moved: usize,
 }
 
 impl Default for Consistency {
@@ -128,11 +137,28 @@ impl Default for Consistency {
             bank: None,
             held: 0,
             settled: None,
+            is_live: false,
+            moved: 0,
         }
     }
 }
 
 impl Consistency {
+    /// Watch over a stream without an end, of which there are many: less is kept while gravity stands still, 15 kB.
+    #[must_use]
+    pub fn live() -> Consistency {
+        Consistency {
+            is_live: true,
+            ..Consistency::default()
+        }
+    }
+
+    /// Whether gravity stood still through a minute and more of motion.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.settled.is_none() && self.bank.is_none() && self.moved >= SOUND_LEAST
+    }
+
     /// Takes the next reading; one without numbers is passed over.
     pub fn push(&mut self, reading: &Reading) {
         let mut numbers = reading.gyro.as_vector().iter().chain(&reading.force);
@@ -215,6 +241,18 @@ impl Consistency {
         }
     }
 
+    /// Lets go of what a healthy stream does not need.
+    fn forget(&mut self, opens: bool) {
+        let is_still = self.scattered.iter().all(|scattered| !scattered);
+        if self.bank.is_none() && !opens && is_still {
+            self.kept = VecDeque::new();
+        }
+        if self.moved >= OPEN_LEAST && is_still && self.settled.is_none() && self.bank.is_some() {
+            self.bank = None;
+            self.moved = 0;
+        }
+    }
+
     /// Judges the segment that the run of blocks makes.
     fn close(&mut self, gravity: f64) {
         let bias = self.rest.bias();
@@ -240,6 +278,10 @@ impl Consistency {
         let scattered = self.scattered.iter().filter(|s| **s).count() as f64;
         let opens = self.scattered.len() >= GATE_LEAST
             && scattered >= GATE_SHARE * self.scattered.len() as f64;
+        self.moved += 1;
+        if self.is_live {
+            self.forget(opens);
+        }
         match &mut self.bank {
             Some(bank) => self
                 .kept
@@ -247,6 +289,7 @@ impl Consistency {
                 .into_iter()
                 .for_each(|last| bank.push(last)),
             None if opens => {
+                self.moved = 0;
                 let bank = self.bank.insert(Evidence::new());
                 self.kept.iter().for_each(|segment| bank.push(segment));
             }

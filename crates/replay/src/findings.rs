@@ -4,6 +4,7 @@
 //! here. Thresholds are opinions, and lie here too, beside the words; what is counted of the samples for them is in
 //! [`strapd_attitude::condition::quality`]. A finding's `code` is stable: scripts match on it.
 
+mod live;
 mod magnetometer;
 mod orientation;
 mod run;
@@ -11,6 +12,7 @@ mod samples;
 mod sensors;
 mod verdicts;
 
+pub use live::{LiveFindings, SensorWatch, is_of_gyro, says};
 pub use run::of_sensor;
 pub(crate) use run::{Noted, of_run};
 pub use samples::of_samples;

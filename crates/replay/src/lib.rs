@@ -21,6 +21,7 @@
 
 pub mod config;
 pub mod error;
+mod field_watch;
 mod finding;
 pub mod findings;
 pub mod info;

@@ -453,6 +453,9 @@ impl Hub {
         self.deliver(sensor, id, text);
         let lost = self.judge(sensor, id, first);
         let faults = sensor.stream.news();
+        for line in sensor.stream.doubted(plan) {
+            log_throttle::warn(&format!("doubt {id} {line}"), &format!("{id}: {line}"));
+        }
         for fault in faults.iter().filter(|f| f.code == Fault::STAMP_UNIT) {
             log_throttle::warn(
                 &format!("stamp unit {id}"),

@@ -4,6 +4,7 @@
 //! one, at most a second old. Since the file is replaced again and again, the lock that keeps a second daemon
 //! out is that of another one beside it, `.NAME.lock`, which stays.
 
+use super::stream::doubts::Lasting;
 use super::stream::run::Span;
 use crate::error::{Error, Result};
 use crate::sink::{self, claim_or_warn, sync_directory};
@@ -12,6 +13,7 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use strapd_attitude::condition::BatchRate;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Memory;
 use strapd_attitude::plausible::{LARGEST, is_covariance, is_unit};
@@ -54,6 +56,12 @@ pub struct Saved {
     /// Memory of the estimator, to go on exactly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     memory: Option<Box<Memory>>,
+    /// Batches in which its samples come: step, ns, size, and step inside, ns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    batches: Option<(f64, usize, f64)>,
+    /// Findings about the sensor that a restart does not end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    lasting: Option<Box<Lasting>>,
 }
 
 /// The last attitudes of all sensors, by `id`.
@@ -82,6 +90,8 @@ impl Saved {
             unit: None,
             seq: 0,
             memory: None,
+            batches: None,
+            lasting: None,
         }
     }
 
@@ -104,6 +114,36 @@ impl Saved {
             memory: memory.filter(Memory::is_plausible).map(Box::new),
             ..self
         }
+    }
+
+    /// Adds findings that a restart does not end.
+    #[must_use]
+    pub(super) fn with_lasting(self, lasting: Option<Lasting>) -> Saved {
+        Saved {
+            lasting: lasting.filter(Lasting::is_plausible).map(Box::new),
+            ..self
+        }
+    }
+
+    /// Adds the batches in which its samples come.
+    #[must_use]
+    pub(super) fn with_batches(self, rate: Option<BatchRate>) -> Saved {
+        Saved {
+            batches: rate.map(|rate| (rate.step, rate.size, rate.inside)),
+            ..self
+        }
+    }
+
+    /// Batches in which its samples come, where that can be.
+    pub(super) fn batches(&self) -> Option<BatchRate> {
+        let (step, size, inside) = self.batches?;
+        let rate = BatchRate { step, size, inside };
+        Some(rate).filter(BatchRate::is_plausible)
+    }
+
+    /// Findings that the restart has not ended.
+    pub(super) fn lasting(&self) -> Option<&Lasting> {
+        self.lasting.as_deref()
     }
 
     /// Span of the run.
@@ -152,6 +192,9 @@ impl Saved {
         }
         if !self.rate.iter().all(|rate| rate.abs() <= LARGEST) {
             return Err("`rate` is none".to_owned());
+        }
+        if !self.lasting().is_none_or(Lasting::is_plausible) {
+            return Err("`lasting` holds what is no finding".to_owned());
         }
         match self.memory().is_none_or(Memory::is_plausible) {
             true => Ok(()),

@@ -8,6 +8,7 @@
 //! same fields. What is decided without them is in the files below.
 
 pub(super) mod attitude_now;
+pub(super) mod doubts;
 mod intervals;
 mod losing;
 mod resetting;
@@ -17,13 +18,13 @@ pub mod stamps;
 
 use crate::pipeline::session_builder::labelled;
 use crate::report::calibration;
-use crate::report::findings::{Finding, of_sensor};
 use crate::serve::core::channel::Channel;
 use crate::serve::core::channel::health::Health;
 use crate::serve::core::recorder::stream_of;
 use crate::serve::core::state::Saved;
 use crate::serve::guard::fault::Fault;
 use crate::sink::Stream;
+use doubts::Doubts;
 use intervals::Intervals;
 pub use losing::Fate;
 use losing::Losing;
@@ -34,7 +35,7 @@ use stamps::{Stamps, TimedSamples};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
-use strapd_attitude::condition::{Clock, Report};
+use strapd_attitude::condition::{Clock, Report, StampRepair};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Aid, EstimationSettings, Forces, Memory};
@@ -77,6 +78,8 @@ pub struct SensorStream {
     intervals: Intervals,
     /// Check of the unit of its stamps.
     stamp_unit: StampUnit,
+    /// Findings about its samples; `None` of one of so many that they are not watched.
+    doubts: Option<Box<Doubts>>,
     /// Reset that was asked of it.
     resetting: Resetting,
     /// First stamp of the run.
@@ -140,8 +143,8 @@ pub fn live_plan(plan: &EstimationSettings) -> Result<EstimationSettings, Diagno
 
 impl SensorStream {
     /// Makes one for the sensor `id`, whose first line states `stated` and brings `together`. `plan` is a
-    /// [`live_plan`]. It goes on from `saved`, where there is such and the stamps do; `declare` makes its
-    /// labels known to clients.
+    /// [`live_plan`]. It goes on from `saved`, where there is such and the stamps do; if `is_watched`, its samples are
+    /// doubted; `declare` makes its labels known to clients.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
@@ -150,7 +153,7 @@ impl SensorStream {
         id: Arc<str>,
         stated: &Line,
         together: &[RawSample],
-        saved: Option<Saved>,
+        (saved, is_watched): (Option<Saved>, bool),
         declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
         let fault = |what: Diagnostic| Fault {
@@ -166,7 +169,12 @@ impl SensorStream {
         let memory = saved.as_ref().and_then(Saved::memory);
         let plan = &expecting(plan, memory.is_some_and(Memory::has_forces_beside));
         let mut prepared = at_once(plan, &resolved, together).map_err(fault)?;
-        let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        prepared.has_arrival = plan.stamps == StampRepair::Auto;
+        prepared.batches = saved
+            .as_ref()
+            .and_then(Saved::batches)
+            .filter(|_| prepared.has_arrival);
+        let mut estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
         let known = plan.calibration.as_deref();
         prepared
             .warnings
@@ -180,10 +188,14 @@ impl SensorStream {
             }
         });
         let first_seq = saved.as_ref().map_or(0, Saved::next_seq);
+        let before = saved.as_ref().and_then(Saved::lasting);
+        let doubts =
+            is_watched.then(|| Box::new(Doubts::new(&resolved, &prepared, &mut estimator, before)));
         Ok(SensorStream {
             channel: declare(&labels),
             id,
             estimator,
+            doubts,
             resolved,
             prepared,
             joining: Joining::Undecided,
@@ -243,12 +255,14 @@ impl SensorStream {
             return Some(saved.clone());
         }
         let saved = Saved::new(self.last.as_ref()?, self.channel.stream());
-        Some(saved.in_run(
+        let saved = saved.in_run(
             self.first,
             self.next_seq,
             self.stamps.unit(),
             self.estimator.memory(),
-        ))
+        );
+        let saved = saved.with_batches(self.conditioning().batches);
+        Some(saved.with_lasting(self.doubts.as_ref().and_then(|doubts| doubts.lasting())))
     }
 
     /// Calibration of the sensor by now. `plan` is that of [`SensorStream::new`].
@@ -421,7 +435,9 @@ impl SensorStream {
         };
         let forces = self.prepared.aiding.map(|aiding| aiding.forces);
         let plan = &expecting(plan, forces == Some(Forces::Beside));
-        let prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
+        let mut prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
+        prepared.has_arrival = plan.stamps == StampRepair::Auto;
+        prepared.batches = self.conditioning().batches;
         let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
         if self.estimator.is_kind_decided() {
             estimator.keep_kind(self.estimator.sample_kind());
@@ -437,6 +453,9 @@ impl SensorStream {
         let saved = self.saved.take().map(|saved| saved.resets());
         let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
         estimator.continue_counts_of(self.conditioning(), resets);
+        if let Some(doubts) = &mut self.doubts {
+            doubts.begin(&self.resolved, &prepared, &mut estimator);
+        }
         (self.estimator, self.prepared) = (estimator, prepared);
         (self.first, self.last) = (None, None);
         self.joining = Joining::Joined;
@@ -501,6 +520,9 @@ impl SensorStream {
             } else if self.joining == Joining::Joined || !self.is_again(plan, raw) {
                 self.reset_if_asked(plan, raw);
                 self.estimator.take(raw);
+                if let Some(doubts) = &mut self.doubts {
+                    doubts.take(raw);
+                }
                 let kind = self.estimator.sample_kind().kind;
                 self.intervals.take(raw, plan.clock, kind);
                 self.stamp_unit.take(raw, plan.clock);
@@ -513,6 +535,9 @@ impl SensorStream {
     fn take_beside(&mut self, plan: &EstimationSettings, raw: &RawSample) {
         if self.joining == Joining::Joined {
             self.estimator.take(raw);
+            if let Some(doubts) = &mut self.doubts {
+                doubts.take(raw);
+            }
         } else {
             if self.early.len() == early_besides::MOST {
                 self.early.pop_front();
@@ -604,16 +629,12 @@ impl SensorStream {
     /// State for `STATUS`.
     #[must_use]
     pub fn status(&self) -> serde_json::Value {
-        let report = self.conditioning();
         let warnings = &self.prepared.warnings;
         let warnings: Vec<String> = warnings
             .iter()
             .map(ToString::to_string)
             .chain(self.intervals.warning())
             .collect();
-        let clock = self.prepared.clock.name();
-        let mut found = of_sensor(report, &self.estimator.propagation(), clock);
-        found.extend(self.stamp_unit.finding());
         let stamp = |s: Nanos| {
             let (sec, nsec) = s.to_sec_nanosec();
             serde_json::json!({"sec": sec, "nsec": nsec})
@@ -638,7 +659,7 @@ impl SensorStream {
             "bias": self.prepared.bias_origin,
             "interval_mismatches": self.intervals.found(),
             "warnings": warnings,
-            "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
+            "findings": self.findings(),
         });
         self.health().beside(own, self.last.as_ref())
     }

@@ -79,9 +79,14 @@ impl Estimated {
             ..Line::default()
         };
         let channel = &mut self.channel;
-        let stream = SensorStream::new(&plan, id.clone(), &stated, samples, None, |labels| {
-            channel.get_or_insert_with(|| hub.declare(labels)).clone()
-        });
+        let stream = SensorStream::new(
+            &plan,
+            id.clone(),
+            &stated,
+            samples,
+            (None, false),
+            |labels| channel.get_or_insert_with(|| hub.declare(labels)).clone(),
+        );
         Ok((plan, stream.map_err(|fault| fault.message)?))
     }
 }

@@ -3,6 +3,7 @@
 //! Apart from the rest of the conditioner because what is known of the clock is asked from outside, too: auxiliary
 //! measurements and samples that are sent again have stamps of the same clock.
 
+use super::clock::{BatchLine, BatchRate};
 use super::gate::Entry;
 use super::{Conditioner, timing};
 use crate::record::{Nanos, RateSample, Verdict};
@@ -37,6 +38,23 @@ impl Conditioner {
         self.timing.join_epoch(epoch);
         self.state.set = (self.state.set.0.saturating_add(jump), jump);
         self.report.note_set(jump, stamp);
+    }
+
+    /// Samples from now on lie on the line of batches of this rate, behind those that have left.
+    #[cold]
+    pub(super) fn lie_on_line(&mut self, rate: &BatchRate) {
+        if self.timing.coarse().is_some() {
+            // Spread over its steps already.
+            return;
+        }
+        let mut line = BatchLine::new(rate);
+        if let Some(last) = self.timing.previous() {
+            line.begin_after(last.stamp.0);
+        }
+        self.timing.expect(line.step());
+        self.batch_line = Some(line);
+        self.batch_learner = None;
+        self.report.batches = Some(*rate);
     }
 
     /// A stamp of the same clock, of this stream or another of its sensor, as the samples of this one are stamped; of the

@@ -78,7 +78,7 @@ impl Conditioner {
     pub fn memory(&self) -> Option<Memory> {
         let (order, untimed) = (self.order.state(), self.order.untimed());
         let waiting = untimed.len().max(order.suspects.len());
-        if self.batch_line.is_some()
+        if (self.batch_line.is_some() && self.window > 0)
             || self.zero.is_some()
             || !self.primed
             || waiting > MOST_WAITING
@@ -121,6 +121,9 @@ impl Conditioner {
         self.order
             .recall(memory.order.clone(), memory.untimed.clone());
         self.timing.set_previous(memory.previous);
+        if let (Some(line), Some(previous)) = (&mut self.batch_line, memory.previous) {
+            line.begin_after(previous.stamp.0);
+        }
         self.report.first = memory.first;
         self.report.last = memory.last;
         true

@@ -6,11 +6,13 @@
 mod gravity;
 mod summary;
 
+pub use super::frozen::FrozenAxis;
 pub use super::rails::Clipped;
 pub use gravity::GyroAgainstGravity;
 pub use summary::{AxisStats, GravityAxis, OffsetStats, SpacingStats};
 
 use super::clock::{Clock, Turns};
+use super::frozen::FrozenAxes;
 use super::histogram::Histogram;
 use super::rails::Rails;
 use super::regularise::{Lines, Uneven};
@@ -85,6 +87,8 @@ pub struct QualitySummary {
     pub axes: [AxisStats; 3],
     /// End of the range at which each was clipped, where its unit is rad/s, and where it is deg/s.
     pub clipped: [[Option<Clipped>; 3]; 2],
+    /// Reading that each hung at while others moved, for the same two units.
+    pub frozen: [[Option<FrozenAxis>; 3]; 2],
     /// Samples with an acceleration.
     pub with_accel: u64,
     /// Number of these with NaN or infinity.
@@ -136,6 +140,7 @@ pub struct Quality {
     last_row_lone_zero: bool,
     axes: [Axis; 3],
     rails: Rails,
+    frozen: [FrozenAxes; 2],
     previous: Option<[f64; 3]>,
     first_orientation: Option<[f64; 4]>,
     offset: Offset,
@@ -183,12 +188,23 @@ impl Quality {
             last_row_lone_zero: false,
             axes: [Axis::EMPTY; 3],
             rails: Rails::new(),
+            frozen: [1.0, 1.0_f64.to_degrees()].map(FrozenAxes::new),
             previous: None,
             first_orientation: None,
             offset: Offset::default(),
             window: Window::default(),
             gravity: GravityTrack::default(),
             quietest: None,
+        }
+    }
+
+    /// The same without percentiles of steps, in 5 kB: of one of many live streams.
+    #[must_use]
+    pub fn without_steps(clock: Clock) -> Self {
+        Quality {
+            spacing: Histogram::without_bins(),
+            jitter: Histogram::without_bins(),
+            ..Quality::new(clock)
         }
     }
 
@@ -343,6 +359,7 @@ impl Quality {
             axis.push(v);
         }
         self.rails.push(&gyro);
+        self.frozen.iter_mut().for_each(|axes| axes.push(&gyro));
         Some(gyro)
     }
 

@@ -3,7 +3,7 @@
 //! A stage of its own because bad data never ends a run: this is where it is accounted for, in
 //! bounded memory, with the first case of each kind kept so that a message can point at it.
 
-use super::clock::Period;
+use super::clock::{BatchRate, Period};
 use super::spikes::SpikeCount;
 use crate::record::{Counts, Join, Nanos, Verdict};
 
@@ -129,6 +129,8 @@ pub struct Report {
     pub accel_dropped: u64,
     /// Spikes that were repaired.
     pub spikes: SpikeCount,
+    /// Spikes that had left when what came behind them showed them: of a stream that waits for nothing.
+    pub spikes_left: SpikeCount,
     /// The ordinary spacing, nanoseconds; `None` until two samples were used.
     pub spacing_nanos: Option<i64>,
     /// The step of the clock, nanoseconds, where it is coarser than the sensor's: its samples were spread
@@ -138,6 +140,8 @@ pub struct Report {
     pub wraps: Option<Wraps>,
     /// Steps of the stamp clock by the arrival clock, taken off; `None` where there were none.
     pub clock_set: Option<ClockSet>,
+    /// Rate of batches that were found, or known, in a live stream, and spread evenly.
+    pub batches: Option<BatchRate>,
     /// Stamp of the first sample used.
     pub first: Option<Nanos>,
     /// Stamp of the last sample used so far.
@@ -146,6 +150,14 @@ pub struct Report {
 }
 
 impl Report {
+    /// Report of a stream whose batches are known before its first sample.
+    pub(super) fn of_batches(batches: Option<BatchRate>) -> Report {
+        Report {
+            batches,
+            ..Report::default()
+        }
+    }
+
     /// Nanoseconds from the first sample used to the last, as if the clock had never jumped back.
     #[must_use]
     pub fn duration_nanos(&self) -> i64 {

@@ -4,7 +4,8 @@
 //! glitch is a run of one to three samples far off the line between its neighbours, while these agree with each other,
 //! nothing shortly before was like it, and the accelerometer felt no blow. `docs/theory/spikes.md` derives the rule.
 //!
-//! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), it is off.
+//! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), it repairs nothing
+//! and counts what has passed.
 
 use super::gate::{Entry, NO_ACCEL, finite_accel};
 use super::repairs::SpikePolicy;
@@ -57,6 +58,46 @@ pub(super) struct Spikes {
     drops_force: bool,
 }
 
+/// Looks for spikes in entries that have left, and lets them be.
+#[derive(Clone, Debug)]
+pub(super) struct Passed {
+    spikes: Spikes,
+    /// The last entries, oldest first.
+    last: [Option<Entry>; LONGEST + 1],
+}
+
+impl Passed {
+    /// The stage that `settings` ask for, where nothing waits.
+    pub(super) fn of(settings: &Settings) -> Option<Passed> {
+        let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window == 0;
+        (is_on && is_rate(settings)).then(|| Passed {
+            spikes: Spikes::new(),
+            last: [None; LONGEST + 1],
+        })
+    }
+
+    /// Takes the next entry, and judges the one that came so many before it that those between tell.
+    #[inline]
+    pub(super) fn take(
+        &mut self,
+        entry: &Entry,
+        steps: (Option<i64>, Option<i64>),
+        count: &mut SpikeCount,
+    ) {
+        self.last.rotate_left(1);
+        if let Some(newest) = self.last.last_mut() {
+            *newest = Some(*entry);
+        }
+        if let [Some(first), Some(a), Some(b), Some(c)] = self.last {
+            self.spikes.repaired(&first, &[a, b, c], steps, count);
+        }
+    }
+}
+
+fn is_rate(settings: &Settings) -> bool {
+    matches!(settings.kind, SampleKind::Rate | SampleKind::Average)
+}
+
 /// The last samples, as far as the rule needs them.
 #[derive(Clone, Debug)]
 struct Past {
@@ -86,9 +127,8 @@ struct Run {
 impl Spikes {
     /// The stage that `settings` ask for.
     pub(super) fn of(settings: &Settings) -> Option<Spikes> {
-        let is_rate = matches!(settings.kind, SampleKind::Rate | SampleKind::Average);
         let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window > LONGEST;
-        (is_on && is_rate).then(Spikes::new)
+        (is_on && is_rate(settings)).then(Spikes::new)
     }
 
     fn new() -> Spikes {

@@ -41,6 +41,8 @@ const LONGEST_WAIT_NANOS: i64 = 500_000_000;
 const TURNED: std::ops::Range<f64> = 0.35..1e3;
 /// Segments that are kept; of a longer recording every second, every fourth one.
 const KEPT: usize = 128;
+/// The newest segments, which are kept of a stream without an end.
+const KEPT_LIVE: usize = 24;
 
 /// A rate with the field and the force that belong to it, in one set of axes.
 #[derive(Clone, Copy, Debug)]
@@ -104,9 +106,46 @@ pub struct FieldConsistency {
     /// Number of segments passed over after one that is kept.
     stride: usize,
     passed: usize,
+    /// Whether it runs beside a stream without an end, of which the newest segments are kept.
+    is_live: bool,
+    /// Segments so far.
+    closed: usize,
 }
 
 impl FieldConsistency {
+    /// Watch over a stream without an end: the newest segments alone are kept, 60 kB.
+    #[must_use]
+    pub fn live() -> FieldConsistency {
+        FieldConsistency {
+            is_live: true,
+            ..FieldConsistency::default()
+        }
+    }
+
+    /// Whether it was made by [`FieldConsistency::live`].
+    pub(crate) fn is_live(&self) -> bool {
+        self.is_live
+    }
+
+    /// Number of segments of four seconds so far that told something.
+    #[must_use]
+    pub fn segments(&self) -> usize {
+        self.closed
+    }
+
+    /// Median scatter of the field in the integrated frame as recorded, as a share of it; `None` before the first segment.
+    /// A few operations, unlike [`FieldConsistency::disagreement`] and [`FieldConsistency::iron`].
+    #[must_use]
+    pub fn scatter(&self) -> Option<f64> {
+        const DIAGONAL: [usize; 3] = [0, 4, 8];
+        let of = |segment: &FieldSegment| {
+            let row = |i: usize| DIAGONAL.into_iter().map(move |j| segment.gram[(i, j)]);
+            DIAGONAL.into_iter().flat_map(row).sum::<f64>() / segment.square
+        };
+        let mut all: Vec<f64> = self.kept.iter().map(of).collect();
+        (!all.is_empty()).then(|| crate::median::median(&mut all).max(0.0).sqrt())
+    }
+
     /// Takes the next reading; a rate without numbers is passed over, and so is a field of zero.
     pub fn push(&mut self, reading: &FieldReading) {
         if !reading.gyro.as_vector().iter().all(|rate| rate.is_finite()) {
@@ -230,6 +269,10 @@ impl FieldConsistency {
             return;
         };
         self.passed = 0;
+        self.closed += 1;
+        if self.is_live && self.kept.len() >= KEPT_LIVE {
+            self.kept.remove(0);
+        }
         self.kept.push(segment);
         if self.kept.len() > KEPT {
             let mut n = 0;

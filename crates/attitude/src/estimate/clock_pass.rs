@@ -216,6 +216,18 @@ impl ClockPass {
     }
 }
 
+/// Message about the speed of a stamp clock against that of arrival, where it is no clock's.
+#[must_use]
+pub fn speed_message(found: &ClockSpeed) -> Option<Diagnostic> {
+    is_wrong(found).then(|| of_speed(found, None))
+}
+
+/// Message about samples of batches that were spread evenly.
+#[must_use]
+pub fn batches_message(rate: &BatchRate) -> Diagnostic {
+    spread_evenly(rate)
+}
+
 fn is_wrong(found: &ClockSpeed) -> bool {
     found.verdict == SpeedVerdict::Wrong
 }

@@ -557,9 +557,31 @@ impl Estimator {
     /// Holds the gyro against accelerometer and magnetometer from now on, for [`Estimator::consistency`] and
     /// [`Estimator::field_consistency`]; `resolved` and `prepared` are those by which this was made.
     pub fn watch_sensors(&mut self, resolved: &Meaning, prepared: &Prepared) {
-        self.watch = Some(GyroWatch::new(&resolved.to_body()));
-        let watch = MagnetometerWatch::new(resolved, prepared.clock);
+        let sensors = (Consistency::default(), FieldConsistency::default());
+        self.watch_by(resolved, prepared, sensors);
+    }
+
+    /// The same of a stream without an end, of which there may be many: less is kept of what is healthy.
+    pub fn watch_sensors_live(&mut self, resolved: &Meaning, prepared: &Prepared) {
+        let sensors = (Consistency::live(), FieldConsistency::live());
+        self.watch_by(resolved, prepared, sensors);
+    }
+
+    fn watch_by(
+        &mut self,
+        resolved: &Meaning,
+        prepared: &Prepared,
+        (gyro, field): (Consistency, FieldConsistency),
+    ) {
+        self.watch = Some(GyroWatch::new(&resolved.to_body(), gyro));
+        let watch = MagnetometerWatch::new(resolved, prepared.clock, field);
         self.magnetometer = Some(Box::new(watch));
+    }
+
+    /// Number that tells settings apart under which samples, or what is remembered of them, mean something else.
+    #[must_use]
+    pub fn settings_fingerprint(&self) -> u64 {
+        self.settings
     }
 
     /// Gyro against accelerometer as far as was seen; `None` where nobody asked to watch.

@@ -23,9 +23,9 @@ pub(super) struct GyroWatch {
 
 impl GyroWatch {
     /// Watch over a sensor whose columns `to_body` takes to body axes.
-    pub(super) fn new(to_body: &Matrix3<f64>) -> GyroWatch {
+    pub(super) fn new(to_body: &Matrix3<f64>, consistency: Consistency) -> GyroWatch {
         GyroWatch {
-            consistency: Consistency::default(),
+            consistency,
             to_sensor: to_body.transpose(),
             force: None,
         }

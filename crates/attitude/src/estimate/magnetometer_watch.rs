@@ -40,9 +40,13 @@ pub(super) struct MagnetometerWatch {
 
 impl MagnetometerWatch {
     /// Watch over samples understood as `resolved`, timed by `clock`.
-    pub(super) fn new(resolved: &Meaning, clock: Clock) -> MagnetometerWatch {
+    pub(super) fn new(
+        resolved: &Meaning,
+        clock: Clock,
+        consistency: FieldConsistency,
+    ) -> MagnetometerWatch {
         MagnetometerWatch {
-            consistency: FieldConsistency::default(),
+            consistency,
             waiting: VecDeque::new(),
             pairing: VectorPairing::with_repeats(),
             rates: VecDeque::new(),
@@ -76,6 +80,9 @@ impl MagnetometerWatch {
 
     /// Takes conditioned samples.
     pub(super) fn push(&mut self, samples: &[RateSample]) {
+        if !self.has_field && self.consistency.is_live() {
+            return;
+        }
         for sample in samples {
             let held = self
                 .force

@@ -2,11 +2,12 @@
 
 use super::{Finding, Severity, magnetometer, orientation, samples, sensors};
 use crate::summary::aid::Frozen;
+use crate::summary::clocks::{clock_was_set, counter_wraps};
 use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
 use strapd_attitude::consistency::{Consistency, FieldConsistency};
-use strapd_attitude::estimate::{EstimationSettings, Meaning};
+use strapd_attitude::estimate::{EstimationSettings, Meaning, batches_message};
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
@@ -143,7 +144,12 @@ pub fn of_sensor(report: &Report, propagation: &propagate::Report, clock: &str) 
     let mut out: Vec<Finding> = gaps(&held).into_iter().collect();
     out.extend(steps(propagation.undersampled, propagation.largest_step));
     out.extend(stamps(report, clock));
+    out.extend(report.clock_set.map(clock_was_set));
+    out.extend(report.wraps.map(counter_wraps));
+    let batches = report.batches.as_ref().map(batches_message);
+    out.extend(batches.map(|said| Finding::said(Severity::Warning, "batches", &said)));
     out.extend(saturated(report));
+    out.extend(spikes_left(report));
     out.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     out
 }
@@ -252,7 +258,7 @@ pub(super) fn steps(undersampled: u64, largest_step: f64) -> Option<Finding> {
 }
 
 /// A magnetometer that says the same while the body rotates.
-fn field_frozen(report: &Report, frozen: Frozen) -> Finding {
+pub(super) fn field_frozen(report: &Report, frozen: Frozen) -> Finding {
     let at = report
         .first
         .map_or(0.0, |first| frozen.from.secs_since(first));
@@ -338,6 +344,25 @@ fn spikes(report: &Report) -> Option<Finding> {
         .with("first_at_s", at)
         .advise("each was replaced by the line between its neighbours; to leave them as recorded")
         .help([SPIKES.to("keep")])
+    })
+}
+
+/// The same in a stream that waits for nothing.
+fn spikes_left(report: &Report) -> Option<Finding> {
+    let found = report.spikes_left;
+    let largest = significant(found.largest, 3);
+    (found.samples > 0).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "spikes",
+            format!(
+                "{} spikes of the gyro, up to {largest} rad/s: left as they came",
+                found.samples
+            ),
+        )
+        .with("count", found.samples)
+        .with("largest_rad_s", found.largest)
+        .advise("a live stream waits for no later sample: mend the bus or its driver; a recording is repaired")
     })
 }
 

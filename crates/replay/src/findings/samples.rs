@@ -30,7 +30,7 @@ const STILL_DEVIATION: f64 = 0.025;
 const STUCK_SAMPLES: u64 = 100;
 
 /// Samples of a topic, and facts about them that several rules need.
-struct Seen<'a> {
+pub(super) struct Seen<'a> {
     looked: &'a Inspection,
     /// Samples, as who has counted them says.
     total: u64,
@@ -65,6 +65,22 @@ const RULES: [Rule; 18] = [
     bias,
 ];
 
+/// The rules for a live sensor, whose stamps and steps are judged as they come.
+const LIVE: [Rule; 7] = [
+    rows,
+    degrees,
+    gravity::turns_otherwise,
+    gravity::unit,
+    gravity::mounting,
+    clipped_or_stuck,
+    silent,
+];
+
+/// Findings from the samples of a live sensor.
+pub(super) fn live(seen: &Seen<'_>) -> Vec<Finding> {
+    found_by(&LIVE, seen)
+}
+
 /// Findings from the samples of a topic as they were recorded.
 #[must_use]
 pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
@@ -90,7 +106,7 @@ fn found_by(rules: &[Rule], seen: &Seen<'_>) -> Vec<Finding> {
 }
 
 impl Seen<'_> {
-    fn of(looked: &Inspection, total: u64) -> Seen<'_> {
+    pub(super) fn of(looked: &Inspection, total: u64) -> Seen<'_> {
         let unit = match is_fast(looked) || gravity::shows_degrees(looked) {
             true => 57.3,
             false => 1.0,
@@ -161,6 +177,8 @@ fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let [in_rad, in_degrees] = &seen.looked.quality.clipped;
     let is_in_degrees = seen.unit > 1.0;
     let clipped = if is_in_degrees { in_degrees } else { in_rad };
+    let [in_rad, in_degrees] = &seen.looked.quality.frozen;
+    let frozen = if is_in_degrees { in_degrees } else { in_rad };
     // One that never reads anything else is not there, or not turned about.
     let moving = axes
         .iter()
@@ -186,10 +204,11 @@ fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
             // A clipped axis repeats one value too, for another reason.
             continue;
         }
-        let samples = stats.longest_run;
         let mut others = axes.iter().enumerate().filter(|(i, _)| *i != axis);
-        let others_move = others.any(|(_, other)| other.longest_run * 10 < samples);
-        if samples >= STUCK_SAMPLES && others_move {
+        let others_move = others.any(|(_, other)| other.longest_run * 10 < stats.longest_run);
+        let long = Some(stats.longest_run).filter(|run| *run >= STUCK_SAMPLES && others_move);
+        let frozen = frozen.get(axis).copied().flatten();
+        if let Some(samples) = frozen.map(|frozen| frozen.samples).or(long) {
             out.push(
                 Finding::new(
                     Severity::Error,

@@ -224,6 +224,11 @@ fn tried(recorded: f64, cured: f64, what: &str) -> String {
     )
 }
 
+/// Whether a finding of this code guesses at what a comparison with gravity finds out.
+pub(super) fn is_guess(code: &str) -> bool {
+    GUESSES.contains(&code)
+}
+
 /// Leaves of several findings about one cause the one that knows it best.
 pub(super) fn settle(found: &mut Vec<Finding>) {
     let Some(cause) = found.iter().find(|f| [AXES, SCALE].contains(&f.code)) else {

@@ -10,6 +10,22 @@ use strapd_attitude::condition::{ClockSet, Wraps};
 use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::STAMPS;
 
+/// Note about the counter behind the stamps of a live sensor, which has no summary.
+pub(crate) fn counter_wraps(wraps: Wraps) -> Finding {
+    let times = match wraps.count {
+        1 => "1 wrap".to_owned(),
+        n => format!("{n} wraps"),
+    };
+    Finding::new(
+        Severity::Note,
+        "counter-wraps",
+        format!("{}: {times}, continued", wraps.period),
+    )
+    .with("count", wraps.count)
+    .with("period_s", wraps.period.nanos as f64 * 1e-9)
+    .advise("nothing is lost by it")
+}
+
 /// Row of the wraps of a counter; `span` is the first and the last stamp.
 pub(super) fn wraps_row(wraps: Option<Wraps>, span: Option<(Nanos, Nanos)>) -> Row {
     let json = |wraps: Wraps| {

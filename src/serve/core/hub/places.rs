@@ -16,6 +16,8 @@ use std::time::Duration;
 
 /// The time between two looks for sensors that were silent for too long.
 pub const TICK: Duration = Duration::from_millis(250);
+/// Sensors whose samples are doubted: those beyond would take 100 kB each for it.
+const WATCHED: usize = 1000;
 /// Sensors that gave way last, in `STATUS`.
 const TOLD: usize = 16;
 
@@ -103,7 +105,7 @@ impl Hub {
             id.clone(),
             run.head,
             run.samples,
-            last,
+            (last, sensors.len() < WATCHED),
             |labels| self.declare(labels),
         )?;
         lock(&self.sensors.absent).remove(&id);

@@ -7,6 +7,7 @@ use crate::serve::core::outgoing;
 use axum::body::Body;
 use axum::extract::Extension;
 use axum::http::{Response, StatusCode};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use strapd_attitude::record::Verdict;
 
@@ -105,8 +106,33 @@ fn exposition(hub: &Hub) -> String {
             label(sensor.id())
         );
     });
+    findings(&mut out, hub, family);
     outgoing::exposition(&mut out, hub.outgoing());
     out
+}
+
+/// Number of findings that `STATUS` has of each sensor, by severity.
+fn findings(out: &mut String, hub: &Hub, family: impl Fn(&mut String, &str, &str, &str)) {
+    family(
+        out,
+        "sensor_findings",
+        "gauge",
+        "Findings about a sensor, as in STATUS, by severity.",
+    );
+    hub.each_sensor(|sensor| {
+        let mut counts = BTreeMap::new();
+        for finding in sensor.findings() {
+            let severity = finding["severity"].as_str().unwrap_or_default().to_owned();
+            *counts.entry(severity).or_insert(0) += 1;
+        }
+        let id = label(sensor.id());
+        for (severity, n) in counts {
+            let _ = writeln!(
+                out,
+                "strapd_sensor_findings{{id=\"{id}\",severity=\"{severity}\"}} {n}"
+            );
+        }
+    });
 }
 
 /// A label's value; names come from outside.

@@ -54,6 +54,11 @@ impl BatchLine {
         }
     }
 
+    /// Gives no stamp before this one, or at it.
+    pub(crate) fn begin_after(&mut self, stamp: i64) {
+        self.out = Some(stamp);
+    }
+
     /// The step, nanoseconds.
     pub(crate) fn step(&self) -> f64 {
         self.step

@@ -26,6 +26,8 @@ pub(super) const STEPS: (f64, f64) = (20e3, 2e9);
 /// Fewest samples and batches that tell.
 const LEAST: usize = 24;
 const LEAST_BATCHES: usize = 5;
+/// Largest batch that is believed.
+const MOST_SIZE: usize = 100_000;
 /// Longest step that is surely no gap, nanoseconds, and in median steps.
 const GAP: f64 = 1e9;
 const GAP_STEPS: f64 = 20.0;
@@ -44,7 +46,7 @@ pub enum Batches {
 }
 
 /// Rate at which the samples of batches were taken.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct BatchRate {
     /// Step of the sensor, nanoseconds.
     pub step: f64,
@@ -52,6 +54,16 @@ pub struct BatchRate {
     pub size: usize,
     /// Median step inside a batch, nanoseconds.
     pub inside: f64,
+}
+
+impl BatchRate {
+    /// Whether a sensor can have it: of what was read from outside.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        (STEPS.0..=STEPS.1).contains(&self.step)
+            && (1..=MOST_SIZE).contains(&self.size)
+            && (0.0..self.step).contains(&self.inside)
+    }
 }
 
 /// Judges stamps, nanoseconds in the order in which they came, by the rates, where there are any.
