@@ -13,6 +13,8 @@ const ROTATED: f64 = 0.5;
 const WINDOW: i64 = 5_000_000_000;
 /// A slow magnetometer repeats itself for less, ns.
 const REPEATED: i64 = 2_000_000_000;
+/// A field that has been the same for less is one that changes: no rotation is followed, ns.
+const FOLLOWED: i64 = 250_000_000;
 /// Across a longer step between rates, ns, nothing is known of the rotation.
 const STEP: i64 = 500_000_000;
 
@@ -68,14 +70,20 @@ impl FieldWatch {
         self.thaw(stamp);
         self.changes += 1;
         self.field = Some(field);
-        self.since = stamp;
-        self.restart(stamp);
+        (self.since, self.anchor) = (stamp, stamp);
     }
 
     /// Takes what a sample says of the rotation, in the axes of the field: rad/s, or rad.
     pub(crate) fn take_rate(&mut self, gyro: [f64; 3], stamp: Nanos) {
         let step = self.last.replace(stamp).map_or(0, |last| stamp.since(last));
         let Some(field) = self.field else { return };
+        if stamp.since(self.since) < FOLLOWED {
+            self.anchor = self.since;
+            return;
+        }
+        if self.anchor <= self.since {
+            return self.restart(stamp);
+        }
         let gyro = Vector3::from(gyro);
         if !(0..=STEP).contains(&step) || !gyro.iter().all(|v| v.is_finite()) {
             self.restart(stamp);

@@ -31,8 +31,9 @@ const OF_GYRO: [&str; 3] = ["gyro-axes", "gyro-scale", "gyro-against-gravity"];
 const OFTEN: usize = 24;
 /// Speeds of a stamp clock by arrival that are judged: beyond, a recording is sent, or the unit is another.
 const SPEEDS: std::ops::Range<f64> = 0.2..5.0;
-/// Time of arrival between two judgements of it, ns, samples for the first, and for one pass.
+/// Time of arrival before the first judgement of it, and between two, ns; samples for the first, and for one pass.
 const SPEED_LEAST: i64 = 10_000_000_000;
+const SPEED_PACE: i64 = 60_000_000_000;
 const SPEED_SAMPLES: u64 = 320;
 const SPEED_MOST: u64 = 1 << 15;
 /// Scatter of a field, as a share of it, from which on it is worth a look at axes and iron: 0.01 of healthy sensors.
@@ -47,6 +48,8 @@ pub struct SensorWatch {
     quality: Quality,
     field: FieldWatch,
     has_field: bool,
+    /// Whether settings map axes or scale of a sensor.
+    is_mapped: bool,
     /// Segments with which the field was judged last, and the finding.
     judged: usize,
     of_field: Option<Finding>,
@@ -87,7 +90,11 @@ impl SpeedWatch {
         let since = self
             .last
             .saturating_sub(self.judged.max(self.first.unwrap_or_default()));
-        if span >= SPEED_LEAST && self.samples >= SPEED_SAMPLES && since >= SPEED_LEAST {
+        let pace = match self.judged {
+            0 => SPEED_LEAST,
+            _ => SPEED_PACE,
+        };
+        if span >= SPEED_LEAST && self.samples >= SPEED_SAMPLES && since >= pace {
             self.judged = self.last;
             let found = self.pass.finish().filter(is_a_clock);
             let said = found.as_ref().and_then(speed_message);
@@ -118,11 +125,19 @@ impl SensorWatch {
     #[must_use]
     pub fn new(resolved: &Meaning, prepared: &Prepared, estimator: &mut Estimator) -> SensorWatch {
         estimator.watch_sensors_live(resolved, prepared);
+        let each = Some([1.0, 2.0, 3.0]);
+        let probe = RawSample {
+            gyro: each,
+            accel: each,
+            mag: each,
+            ..RawSample::default()
+        };
         SensorWatch {
             quality: Quality::without_steps(prepared.clock),
             looked: inspection(resolved, prepared),
             field: FieldWatch::new(resolved.kind),
             has_field: false,
+            is_mapped: resolved.remapped(&probe) != probe,
             judged: 0,
             of_field: None,
             speed: (prepared.has_arrival && prepared.clock == Clock::Header)
@@ -133,11 +148,14 @@ impl SensorWatch {
     /// Takes the next sample, as it came.
     pub fn take(&mut self, raw: &RawSample) {
         let resolved = &self.looked.resolved;
-        let raw = resolved.remapped(raw);
+        let raw = match self.is_mapped {
+            true => &resolved.remapped(raw),
+            false => raw,
+        };
         let (rate, force) = (resolved.unit.to_rad(), resolved.accel_scale.abs());
         let gyro = raw.gyro.map(|v| v.map(|v| v * rate));
         self.has_field |= raw.mag.is_some();
-        if let Some(stamp) = self.looked.clock.read(&raw).filter(|_| self.has_field) {
+        if let Some(stamp) = self.looked.clock.read(raw).filter(|_| self.has_field) {
             let field = &mut self.field;
             raw.mag.iter().for_each(|mag| field.take_field(*mag, stamp));
             let gyro = gyro.filter(|_| !raw.is_beside);
@@ -154,7 +172,7 @@ impl SensorWatch {
         self.quality.push(&RawSample {
             gyro,
             accel: raw.accel.map(|v| v.map(|v| v * force)),
-            ..raw
+            ..*raw
         });
     }
 
