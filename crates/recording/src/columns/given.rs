@@ -57,6 +57,7 @@ pub(crate) struct Given {
 /// ```text
 /// gyro=gx:gy:gz                 three columns by their names
 /// gyro=gx:gy:gz:deg/s           and their unit
+/// gyro=2:3:4:deg/s*0.0609756    counts, of which one is so many of the unit
 /// stamp=1:us                    one by its number, from 1, and its unit
 /// orientation=qw:qx:qy:qz       w first
 /// dq=dq_W:dq_X:dq_Y:dq_Z        the rotation since the sample before, w first
@@ -156,7 +157,7 @@ mod tests {
             assert!(is_refused, "{text}: {read:?}");
         }
         assert!(
-            "gyro=a:b:c:deg/s,stamp=1:us,accel=none"
+            "gyro=a:b:c:deg/s*0.06,stamp=1:us,accel=none"
                 .parse::<Columns>()
                 .is_ok()
         );

@@ -133,6 +133,17 @@ pub(crate) fn plain(text: &str) -> String {
 impl Unit {
     /// The unit that a text names, as makers write it.
     pub(crate) fn of(quantity: Quantity, text: &str) -> Option<Unit> {
+        // `deg/s*0.0609756`: counts, of which one is so much; without a unit of the SI's.
+        if let Some((base, factor)) = text.rsplit_once('*')
+            && let Ok(factor) = factor.trim().parse::<f64>()
+        {
+            let base = match base.trim() {
+                "" => Some(Unit::si(quantity)),
+                base => Unit::of(quantity, base),
+            };
+            let is_factor = factor.is_finite() && factor != 0.0;
+            return base.filter(|_| is_factor).map(|base| base.times(factor));
+        }
         let text = plain(text);
         let named = |name: &&str| **name == *text;
         match quantity {
@@ -152,6 +163,38 @@ impl Unit {
                 let found = TIMES.iter().find(|(name, _)| named(name));
                 found.map(|(_, nanos)| Unit::Time(*nanos))
             }
+        }
+    }
+
+    fn si(quantity: Quantity) -> Unit {
+        match quantity {
+            Quantity::Rate => Unit::Rate(GyroUnit::Rad, 1.0),
+            Quantity::Force => Unit::Force(AccelUnit::MetresPerSecondSquared, 1.0),
+            Quantity::Field => Unit::Field(1.0),
+            Quantity::Time => Unit::Time(1e9),
+        }
+    }
+
+    fn times(self, factor: f64) -> Unit {
+        match self {
+            Unit::Rate(unit, scale) => Unit::Rate(unit, scale * factor),
+            Unit::Force(unit, scale) => Unit::Force(unit, scale * factor),
+            Unit::Field(scale) => Unit::Field(scale * factor),
+            Unit::Time(nanos) => Unit::Time(nanos * factor),
+        }
+    }
+
+    /// The same as `--columns` takes it: by its name, or by a unit and a factor.
+    pub(crate) fn stated(self) -> String {
+        let (base, factor) = match self {
+            Unit::Rate(unit, scale) => (Unit::Rate(unit, 1.0), scale),
+            Unit::Force(unit, scale) => (Unit::Force(unit, 1.0), scale),
+            Unit::Field(scale) => (Unit::Field(1.0), scale),
+            Unit::Time(nanos) => (Unit::Time(1.0), nanos),
+        };
+        match self.name() {
+            Some(name) => name.to_owned(),
+            None => format!("{}*{factor}", base.name().unwrap_or_default()),
         }
     }
 
@@ -203,6 +246,34 @@ mod tests {
         assert_eq!(Unit::of(Quantity::Field, "µT"), Some(Unit::Field(1e-6)));
         assert_eq!(Unit::of(Quantity::Field, "mG"), Some(Unit::Field(1e-7)));
         assert_eq!(Unit::of(Quantity::Rate, "LSB"), None);
+        for (quantity, text, unit, stated) in [
+            (
+                Quantity::Rate,
+                "deg/s*0.0609756",
+                Unit::Rate(GyroUnit::Deg, 0.060_975_6),
+                "deg/s*0.0609756",
+            ),
+            (
+                Quantity::Rate,
+                "*-0.001",
+                Unit::Rate(GyroUnit::Rad, -0.001),
+                "rad/s*-0.001",
+            ),
+            (
+                Quantity::Force,
+                "g*0.5",
+                Unit::Force(AccelUnit::StandardGravity, 0.5),
+                "g*0.5",
+            ),
+            (Quantity::Time, "us*4", Unit::Time(4e3), "ns*4000"),
+        ] {
+            let found = Unit::of(quantity, text);
+            assert_eq!(found, Some(unit), "{text}");
+            assert_eq!(unit.stated(), stated);
+        }
+        for text in ["deg/s*0", "deg/s*x", "furlong*2", "deg/s*inf"] {
+            assert_eq!(Unit::of(Quantity::Rate, text), None, "{text}");
+        }
         assert_eq!(Unit::of(Quantity::Time, "ms"), Some(Unit::Time(1e6)));
     }
 

@@ -8,6 +8,7 @@ use super::super::time_of_day::{Daily, DateOrder, date_and_time, since_midnight}
 use super::is_number;
 use super::roles::{Roles, place};
 use crate::columns::Meant;
+use crate::columns::Quantity;
 use crate::columns::Role;
 use crate::columns::Unit;
 use crate::decode::{Bare, bare_of_text, instant_of_date, unit_of, units_that_fit};
@@ -80,7 +81,10 @@ impl Roles<'_> {
             [] => match (self.stepped()?, self.time_of_day()) {
                 (Some(stepped), _) => Ok(stepped),
                 (None, Some(stamp)) => Ok(self.of_stamp(stamp)),
-                (None, None) => self.counted(),
+                (None, None) => match self.called_as_unit().filter(|_| !is_refused) {
+                    Some((at, unit)) => Ok(self.of_stamp(self.stamp(at, Some(unit))?)),
+                    None => self.counted(),
+                },
             },
             [one] => Ok(self.of_stamp(self.stamp(*one, None)?)),
             several => {
@@ -103,9 +107,27 @@ impl Roles<'_> {
         }
     }
 
+    /// A column called `ms`, `us` or `ns` and no more, in a table that has no other time, whose numbers rise: what a
+    /// board prints of its clock.
+    fn called_as_unit(&self) -> Option<(usize, Unit)> {
+        let mut each = self.names.iter().enumerate();
+        let (at, name) = each.find(|(_, name)| {
+            ["ms", "us", "ns"].contains(&name.text.trim().to_lowercase().as_str())
+        })?;
+        let cells = self.rows.iter().filter_map(|row| row.get(at));
+        let numbers: Option<Vec<f64>> = cells.map(|cell| cell.parse().ok()).collect();
+        let numbers = numbers?;
+        let rises = numbers.windows(2).all(|pair| pair.first() <= pair.last());
+        let has_moved = numbers.len() < 2 || numbers.first() < numbers.last();
+        let unit = Unit::of(Quantity::Time, name.text.trim())?;
+        (rises && has_moved).then_some((at, unit))
+    }
+
     fn of_stamp(&self, stamp: Stamp) -> Instants {
         let mut said = format!("stamp={}", self.reference(stamp.at));
-        if let Some(unit) = stamp.unit.and_then(Unit::name) {
+        let given = self.given_of(Role::Stamp).and_then(|given| given.unit);
+        let named = stamp.unit.and_then(Unit::name).map(str::to_owned);
+        if let Some(unit) = given.map(Unit::stated).or(named) {
             said.push_str(&format!(":{unit}"));
         }
         Instants {

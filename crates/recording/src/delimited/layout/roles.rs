@@ -291,7 +291,9 @@ impl Roles<'_> {
                     .iter()
                     .map(|at| self.reference(*at))
                     .collect();
-                said.extend(chosen.unit.and_then(Unit::name).map(str::to_owned));
+                let given = self.given_of(Role::Of(kind)).and_then(|given| given.unit);
+                let named = || chosen.unit.and_then(Unit::name).map(str::to_owned);
+                said.extend(given.map(Unit::stated).or_else(named));
                 assumed.push(format!("{}={}", kind.name(), said.join(":")));
             }
         }

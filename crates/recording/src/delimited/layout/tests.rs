@@ -47,6 +47,22 @@ fn table(head: &str, count: usize, cell: impl Fn(usize) -> String) -> String {
 }
 
 #[test]
+fn a_column_called_as_a_unit_of_time_is_the_clock_where_there_is_no_other() {
+    let text = |head: &str, step: usize| {
+        let rows = (0..40).map(|n| format!("{},0.1,0.2,0.3\n", n * step));
+        format!("{head},gyro_x,gyro_y,gyro_z\n{}", rows.collect::<String>())
+    };
+    for (head, nanos) in [("ms", 1_000_000), ("us", 1000), ("MS", 1_000_000)] {
+        let (rows, _) = rows(&text(head, 5000), None);
+        assert_eq!(rows[39].1, Some(39 * 5000 * nanos), "{head}");
+    }
+    // A step that stays is no clock, and a name of its own wins.
+    assert_eq!(rows(&text("ms", 0), None).0[39].1, None);
+    let beside = table("ms", 40, |n| n.to_string());
+    assert_eq!(rows(&beside, None).0[1].1, Some(1_020_000_000));
+}
+
+#[test]
 fn a_column_that_names_the_sensor_keeps_bodies_apart() {
     let two = |n: usize| ["left", "right"][n % 2].to_owned();
     for head in ["device", "sensor", "imu_id", "MAC", "id", "Device ID"] {
