@@ -156,6 +156,8 @@ turn = [packed(1 + k % 2, k // 2, 0.1, 0.1 * k, 3) for k in range(24)]
 watch = b'{"class":"WATCH","packed":true,"rate_hz":500}\n'
 for name, size in [("packed_as_lines", b"\x40"), ("packed", b"\xff")]:
     seed("session", name, size + bound.encode() + b"".join(turn[:12]) + watch + b"".join(objects) + b"".join(turn[12:]))
+rows = ["boot: rst:0x1", "3,0.2", "time_ms,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"] + ["%d,0,0,1,%d,0,2.5" % (10 * k, k) for k in range(40)]
+seed("session", "table", b"\x20" + "\n".join(rows + [""]).encode())
 seed("session", "motion", b"\xff" + "\n".join(motion + [""]).encode())
 
 seed("foxglove", "subscribe", b'{"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":2}]}')

@@ -15,7 +15,7 @@ use strapd_recording::decode::packed::{self, Object};
 use strapd_recording::decode::{Channel, Decoder, Options, decode_line, role};
 use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
-use strapd_recording::lines::Lines;
+use strapd_recording::lines::{HeldRow, Lines, TableStream};
 use strapd_recording::mcap::{Reader, WalkOptions, walk};
 use strapd_recording::{Input, Warn};
 
@@ -255,9 +255,44 @@ pub fn delimited(data: &[u8]) {
             (rest.get(1..).unwrap_or_default(), options)
         }
     };
+    table_stream(rest, &options);
     let whole = table(rest, usize::MAX, &options);
     let cut = table(rest, 1 + data.len() % 7, &options);
     assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
+}
+
+/// The same line by line, as it comes over a socket: every row that is held comes once, in order, and none after an error.
+fn table_stream(data: &[u8], options: &Options) {
+    let mut stream = TableStream::new(options, data.len() % 2 == 0);
+    let mut samples = Vec::new();
+    let mut last = 0;
+    let mut held = |stream: &mut TableStream, (rows, skipped): (Vec<HeldRow>, u64)| {
+        assert!(rows.len() <= 2 * 200 && skipped <= 2 * 200);
+        for row in rows {
+            assert!(row.number > last);
+            last = row.number;
+            let _ = stream.decode(&row.line, row.received, &mut samples);
+        }
+        assert!(samples.iter().all(|raw| raw.log == NOW));
+        samples.clear();
+    };
+    for (number, line) in (1..).zip(data.split(|b| *b == b'\n')) {
+        if stream.table().is_some() {
+            let _ = stream.decode(line, NOW, &mut Vec::new());
+            continue;
+        }
+        match stream.push(number, NOW, line) {
+            Ok(None) => {}
+            Ok(Some(opened)) => held(&mut stream, opened),
+            Err(why) => {
+                assert!(!why.to_string().is_empty());
+                return;
+            }
+        }
+    }
+    if let Ok(Some(opened)) = stream.finish() {
+        held(&mut stream, opened);
+    }
 }
 
 /// A table in Parquet: every row is a sample, or one that was lost and says why.

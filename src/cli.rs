@@ -26,6 +26,7 @@ pub mod relative;
 pub mod replay;
 pub mod report;
 pub mod send;
+mod serial;
 pub mod serve;
 pub mod serving;
 pub mod setting_args;

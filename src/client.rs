@@ -16,6 +16,7 @@ mod numbers;
 pub mod remote;
 pub mod secret;
 pub mod sender;
+pub mod serial;
 pub mod watcher;
 
 use crate::error::{Error, Result};

@@ -27,4 +27,4 @@ pub mod guard;
 pub mod playback;
 pub mod protocol;
 
-pub use daemon::{Server, Settings};
+pub use daemon::{Listening, Server, Settings};

@@ -4,7 +4,7 @@ pub(super) mod line;
 mod url;
 
 use super::tables::Tables;
-use super::{Global, Outcome};
+use super::{Global, Outcome, serial};
 use crate::client::remote::Remote;
 use crate::config::selection;
 use crate::error::{Error, Result};
@@ -30,7 +30,8 @@ use strapd_recording::remote_object;
   strapd cat flight.mcap --topic /odom --format csv        (so it does a CSV)
   strapd cat tcp://127.0.0.1:4550 -n 100                   attitudes of a daemon as they come
   strapd cat ws://127.0.0.1:8765 --id imu0 --rate-hz 10 -x 60 --format csv
-  strapd cat udp-listen://127.0.0.1:9870                   attitudes that somebody sends here")]
+  strapd cat udp-listen://127.0.0.1:9870                   attitudes that somebody sends here
+  strapd cat serial:///dev/ttyUSB0 -x 5                    samples of a board in 5 s; serial: lists the ports")]
 pub struct Cat {
     #[arg(value_name = "SOURCE", help = super::recordings(
         "Recording",
@@ -87,14 +88,20 @@ pub enum Format {
 /// # Errors
 /// The log cannot be read or decoded; stdout cannot be written.
 pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
+    if serial::asks_for_ports(&args.source) {
+        return serial::list();
+    }
+    let is_port = serial::is_meant(&args.source);
     match args.source.to_str() {
-        Some(text) if Remote::is_meant(text) && remote_object::meant(text).is_none() => {
+        Some(text)
+            if !is_port && Remote::is_meant(text) && remote_object::meant(text).is_none() =>
+        {
             return url::run(args, text);
         }
         _ => {}
     }
     for (given, flag) in [
-        (args.seconds.is_some(), "-x"),
+        (args.seconds.is_some() && !is_port, "-x"),
         (!args.ids.is_empty(), "--id"),
         (args.rate_hz.is_some(), "--rate-hz"),
     ] {
@@ -111,8 +118,9 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     let mut options = selection(None, &args.fields, false, [None; 2])?.decode;
     args.tables.put(&mut options)?;
     let pool = Pool::new(global.threads)?;
+    let source = serial::captured(&args.source, args.seconds)?;
     let log = Recording::told_apart(
-        &opening::open(&args.source)?,
+        &opening::open(source.path())?,
         args.topic.as_deref(),
         &options,
         &pool,

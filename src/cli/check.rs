@@ -2,7 +2,7 @@
 
 use super::estimation::Estimation;
 use super::tables::Tables;
-use super::{Global, Outcome, own_output, print, with_each};
+use super::{Global, Outcome, own_output, print, serial, with_each};
 use crate::error::Result;
 use crate::pipeline::check::{Examination, examine};
 use crate::pipeline::opening;
@@ -23,6 +23,7 @@ use strapd_replay::inspection::Checked;
   strapd check *.mcap                               (one behind the other)
   strapd check flight.mcap --bias auto --gyro-range 34.9     judged as replay with these flags makes it
   strapd check flight.mcap --aid none                        the gyro alone
+  strapd check 'serial:///dev/ttyUSB0?baud=115200&for=10'    ten seconds of a board on a serial port
   strapd check flight.mcap --json | jq '.findings[] | select(.severity != \"note\")'
 
 It judges the attitude that replay makes with the same flags, and marks what a flag deals with.
@@ -54,9 +55,17 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
         command: "strapd check".to_owned(),
     };
     let mut between = "";
+    if args.files.iter().any(|file| serial::asks_for_ports(file)) {
+        return serial::list();
+    }
     let files = own_output::without(args.files.clone(), args.estimation.topic.as_deref())?;
     with_each(&files, |file| {
-        let (text, outcome) = one(global, file, &asked, &pool)?;
+        let file = serial::captured(file, None)?;
+        let (text, outcome) = one(global, file.path(), &asked, &pool)?;
+        let text = match global.json {
+            true => text,
+            false => file.retold(&text),
+        };
         print(&format!("{between}{text}"))?;
         between = if global.json { "" } else { "\n" };
         Ok(outcome)

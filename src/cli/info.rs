@@ -4,7 +4,7 @@ mod aids;
 mod words;
 
 use super::tables::Tables;
-use super::{Global, Outcome, print, with_each};
+use super::{Global, Outcome, print, serial, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::inspection::look;
 use crate::pipeline::opening;
@@ -22,7 +22,8 @@ use strapd_replay::info::Overview;
 #[command(after_help = "Examples:
   strapd info flight.mcap
   strapd info *.mcap                               (one behind the other)
-  strapd info flight.mcap --json | jq '.imu[0].rate_hz'")]
+  strapd info flight.mcap --json | jq '.imu[0].rate_hz'
+  strapd info serial:///dev/ttyUSB0?baud=115200    ten seconds of a board on a serial port; serial: lists the ports")]
 pub struct Info {
     #[arg(value_name = "FILE", required = true, help = super::recordings("Recordings", ", or folders of one"))]
     pub files: Vec<PathBuf>,
@@ -52,9 +53,17 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
         ..Options::default()
     };
     args.tables.put(&mut options)?;
+    if args.files.iter().any(|file| serial::asks_for_ports(file)) {
+        return serial::list();
+    }
     let mut between = "";
     with_each(&args.files, |file| {
-        let (text, outcome) = one(global, args, file, (&options, &pool))?;
+        let file = serial::captured(file, None)?;
+        let (text, outcome) = one(global, args, file.path(), (&options, &pool))?;
+        let text = match global.json {
+            true => text,
+            false => file.retold(&text),
+        };
         print(&format!("{between}{text}"))?;
         between = if global.json { "" } else { "\n" };
         Ok(outcome)

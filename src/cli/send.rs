@@ -5,7 +5,7 @@
 
 use super::cat::line;
 use super::tables::Tables;
-use super::{Global, Outcome, known_words, replay};
+use super::{Global, Outcome, known_words, replay, serial};
 use crate::client;
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
@@ -41,6 +41,7 @@ const CHUNK: usize = 32 << 10;
   strapd send flight.mcap                                  to the daemon of this machine
   strapd send flight.mcap tcp://robot:4550 --speed max     all at once
   strapd send flight.ulg ws://127.0.0.1:8765 --id left     under another name
+  strapd send serial:///dev/ttyUSB0 tcp://robot:4550       lines of a board, as they come
   zstd -dc log.mcap.zst | strapd send - unix:///run/strapd.sock   a pipe, which is read to its end first")]
 pub struct Send {
     #[arg(value_name = "LOG", help = super::recordings("Recording", ""))]
@@ -104,12 +105,18 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
             .help("tcp://HOST:PORT, ws://HOST:PORT or unix:///PATH of a strapd serve"),
         ));
     }
+    if serial::asks_for_ports(&args.source) {
+        return serial::list();
+    }
     let pace = Pace::new(replay::speed(&args.speed)?);
     let token = args
         .token_file
         .as_deref()
         .map(|file| Secret::read("--token-file", file))
         .transpose()?;
+    if serial::is_meant(&args.source) {
+        return serial::forward(&args.source, &remote, token.as_ref());
+    }
     let mut options = selection(None, &args.fields, false, [None; 2])?.decode;
     args.tables.put(&mut options)?;
     // Looked at before anybody is called: a log that cannot be read is not the daemon's business.

@@ -4,11 +4,13 @@ use super::admission::Admission;
 use super::calibration_files::{self, file_of};
 use super::config::Layered;
 use super::estimation::Estimation;
-use super::{Global, Outcome};
+use super::tables::Tables;
+use super::{Global, Outcome, serial};
 use crate::address::Address;
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::serve::core::hub::{self, Hub};
+use crate::serve::core::reading::LineParameters;
 use crate::serve::core::recorder::{self, Recorder, Split};
 use crate::serve::core::state::StateFile;
 use crate::serve::edge::listen;
@@ -16,8 +18,8 @@ use crate::serve::edge::output::Output;
 use crate::serve::edge::source::Endpoint;
 use crate::serve::guard::limits::Limits;
 use crate::serve::guard::shutdown::Signals;
-use crate::serve::{Server, Settings};
-use crate::sink::address::{DEFAULTS, Listen};
+use crate::serve::{Listening, Server, Settings};
+use crate::sink::address::DEFAULTS;
 use crate::sink::{Format, Target};
 use clap::Args;
 use std::io::IsTerminal;
@@ -45,6 +47,8 @@ const MAX_SENSORS: u64 = 100_000;
   strapd cat flight.mcap | strapd serve -                lines on standard input, too
   strapd serve tcp://imu.local:7000?id=imu0              samples from somebody who listens, for as long as it takes
   strapd serve 'ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=phone'
+  strapd serve 'serial:///dev/ttyUSB0?baud=115200&stamp=arrival'
+                                                         a board that sends CSV or JSON without a clock
   strapd serve -o udp://127.0.0.1:9870?profile=plotjuggler
                                                          attitudes to PlotJuggler, as they come
 
@@ -54,8 +58,9 @@ Talk to it:
   http://127.0.0.1:8765/ in a browser                          the live page; /top: a top to spin
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
-    /// Other sources of samples: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
-    /// again whenever lost; ?id=NAME names the sensor), or - for standard input
+    /// Other sources of samples: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH,
+    /// serial:///dev/PORT?baud=RATE (connected to, and again whenever lost; ?id=NAME names the sensor; serial: lists
+    /// the ports), or - for standard input
     #[arg(value_name = "SOURCE")]
     pub sources: Vec<String>,
     /// Listeners: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (with
@@ -70,6 +75,13 @@ pub struct Serve {
     /// Take what is not given as a flag or in the environment from this TOML file
     #[arg(long, value_name = "FILE", env = "STRAPD_CONFIG")]
     pub config: Option<PathBuf>,
+    /// Stamps of samples that have none: those of their arrival, made even. Without it such samples are not used; of one
+    /// address ?stamp=arrival
+    #[arg(long, value_name = "WHEN", value_parser = ["arrival"])]
+    pub stamp: Option<String>,
+    /// Layout of a table.
+    #[command(flatten)]
+    pub tables: Tables,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
@@ -135,6 +147,13 @@ fn window(text: &str) -> std::result::Result<Duration, String> {
 /// # Errors
 /// An address cannot be listened on, or the arguments cannot be.
 pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
+    if args
+        .sources
+        .iter()
+        .any(|source| serial::asks_for_ports(source.as_ref()))
+    {
+        return serial::list();
+    }
     let layered = match &args.config {
         Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
         None => None,
@@ -344,7 +363,7 @@ impl Serve {
             if !Remote::is_meant(text) {
                 return Err(Error::usage(
                     Diagnostic::new(format!(
-                        "serve {}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -",
+                        "serve {}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, serial:///dev/PORT, -",
                         Address::from(text)
                     ))
                     .help(
@@ -401,9 +420,15 @@ impl Serve {
             self.listen.iter().map(String::as_str).collect()
         };
         let (plan, plans) = self.estimation.live_plans()?;
+        let mut decode = self.estimation.selection()?.decode;
+        self.tables.put(&mut decode)?;
         self.admission.apply(Settings {
             hub: hub::Settings {
-                decode: self.estimation.selection()?.decode,
+                decode,
+                lines: LineParameters {
+                    by_arrival: self.stamp.is_some(),
+                    ..LineParameters::default()
+                },
                 plan,
                 plans,
                 limits: Limits {
@@ -415,7 +440,7 @@ impl Serve {
             },
             listen: given
                 .into_iter()
-                .map(Listen::parse)
+                .map(Listening::parse)
                 .collect::<Result<_>>()?,
             sources: self.outgoing()?,
             outputs: self

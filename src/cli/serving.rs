@@ -120,7 +120,7 @@ impl Serving {
                     brings_samples,
                     ..hub::Settings::default()
                 },
-                listen,
+                listen: listen.into_iter().map(Into::into).collect(),
                 ..Settings::default()
             })?;
             let cast = PlaybackServer::start(settings, playback, self.page.is_some(), true)?;

@@ -50,6 +50,7 @@ enum Wire {
     Unix(tokio::net::UnixStream),
     WebSocket(Box<Web>),
     Udp(UdpSocket),
+    Serial(serial2_tokio::SerialPort),
 }
 
 #[derive(Debug)]
@@ -116,6 +117,7 @@ impl Link {
                 Ok(Heard::Message)
             }
             Wire::WebSocket(web) => web.read(buffer).await,
+            Wire::Serial(port) => stream_of_bytes(port, buffer).await,
         }
     }
 
@@ -131,6 +133,7 @@ impl Link {
                 Wire::Unix(stream) => stream.write_all(format!("{line}\n").as_bytes()).await,
                 Wire::WebSocket(web) => web.stream.send(Message::text(line)).await.map_err(broken),
                 Wire::Udp(_) => Err(io::ErrorKind::Unsupported.into()),
+                Wire::Serial(port) => port.write_all(format!("{line}\n").as_bytes()).await,
             }
         };
         timeout(SEND, sending)
@@ -148,7 +151,8 @@ impl Link {
             #[cfg(unix)]
             Wire::Unix(stream) => stream.shutdown().await,
             Wire::WebSocket(web) => web.stream.send(Message::Close(None)).await.map_err(broken),
-            Wire::Udp(_) => Ok(()),
+            // A port has one end for both ways.
+            Wire::Udp(_) | Wire::Serial(_) => Ok(()),
         }
     }
 }
@@ -182,6 +186,7 @@ async fn open(remote: &Remote, token: Option<&str>, max_message: usize) -> Resul
             let bound = socket.local_addr().map_err(|e| e.to_string())?;
             (Wire::Udp(socket), format!("udp-listen://{bound}"))
         }
+        Remote::Serial(place) => (Wire::Serial(place.open()?), place.to_string()),
     };
     Ok(Link { wire, peer })
 }

@@ -2,6 +2,7 @@
 //! connect. Pure: names are looked up when connecting, so that one that is unknown today may be
 //! known tomorrow.
 
+use super::serial::SerialPlace;
 use crate::address::Address;
 use crate::error::{Error, Result};
 use std::fmt;
@@ -24,6 +25,8 @@ pub enum Remote {
     Unix(PathBuf),
     /// Datagrams that somebody sends here.
     UdpListen(Place),
+    /// A serial port.
+    Serial(SerialPlace),
 }
 
 /// A host, by name or number, and a port.
@@ -38,8 +41,7 @@ pub struct Place {
 /// A parameter of a query: name and value, decoded.
 pub type Parameter = (String, String);
 
-const KNOWN: &str =
-    "known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, udp-listen://HOST:PORT";
+const KNOWN: &str = "known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, udp-listen://HOST:PORT, serial:///dev/PORT?baud=RATE";
 /// Longer than any address.
 const MAX_BYTES: usize = 2048;
 
@@ -90,7 +92,7 @@ impl Remote {
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
         let (rest, _) = rest.split_once('#').unwrap_or((rest, ""));
         let (rest, query) = rest.split_once('?').unwrap_or((rest, ""));
-        let parameters =
+        let mut parameters =
             parameters(query).ok_or_else(|| refuse("a `%` needs two digits after it"))?;
         let place = |authority: &str| Place::parse(authority).map_err(|what| refuse(&what));
         let bare = rest.strip_suffix('/').unwrap_or(rest);
@@ -99,6 +101,10 @@ impl Remote {
             "udp-listen" => Remote::UdpListen(place(bare)?),
             "unix" if rest.starts_with('/') => Remote::Unix(PathBuf::from(rest)),
             "unix" => return Err(refuse("an absolute path is needed")),
+            "serial" => {
+                let place = SerialPlace::parse(rest, &mut parameters);
+                Remote::Serial(place.map_err(|what| refuse(&what))?)
+            }
             "ws" => {
                 let (authority, path) = match rest.find('/') {
                     Some(at) => rest.split_at(at),
@@ -185,6 +191,7 @@ impl fmt::Display for Remote {
             Remote::WebSocket { place, resource } => write!(f, "ws://{place}{resource}"),
             Remote::Unix(path) => write!(f, "unix://{}", path.display()),
             Remote::UdpListen(place) => write!(f, "udp-listen://{place}"),
+            Remote::Serial(place) => place.fmt(f),
         }
     }
 }
@@ -244,6 +251,8 @@ mod tests {
             "ws://phone.local:8080/sensor/connect",
             "unix:///run/strapd.sock",
             "udp-listen://127.0.0.1:0",
+            "serial:///dev/ttyUSB0",
+            "serial:///dev/serial/by-id/usb-1a86?baud=9600",
         ] {
             assert_eq!(Remote::parse(text).unwrap().to_string(), text);
         }

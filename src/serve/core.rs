@@ -5,6 +5,7 @@
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`viewer`] | the same for Foxglove's viewers: messages in place of lines | sans-I/O |
 //! | `owned` | the sensors one client sends -> hub, and again when they were put away | locks |
+//! | [`reading`] | parameters of an address -> how the lines of its connections are read | pure |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | `run_builder` | lines of one sensor -> a run of its samples | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
@@ -24,6 +25,7 @@ pub mod outbox;
 pub(super) mod outgoing;
 pub(super) mod owned;
 pub(super) mod read_buffer;
+pub mod reading;
 pub mod recorder;
 pub(super) mod run_builder;
 pub mod session;

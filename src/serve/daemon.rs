@@ -10,6 +10,7 @@ use super::core::context::Context;
 use super::core::hub::{self, Hub};
 use super::core::outgoing::Outgoing;
 use super::core::read_buffer::now;
+use super::core::reading::{LineParameters, Reading};
 use super::edge::listen::{self, Listener};
 use super::edge::output::Output;
 use super::edge::source::Endpoint;
@@ -17,11 +18,57 @@ use super::edge::{connect, forward};
 use super::guard::admission::{Web, is_loopback};
 use super::guard::places::Places;
 use super::guard::shutdown::Shutdown;
+use crate::address::Address;
+use crate::client::remote;
 use crate::error::{Error, Result};
 use crate::sink::address::Listen;
 use std::future::Future;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
+
+/// An address to listen on, and how the lines that come there are read.
+#[derive(Clone, Debug)]
+pub struct Listening {
+    /// Address.
+    pub address: Listen,
+    /// Parameters of the address.
+    pub lines: LineParameters,
+}
+
+impl Listening {
+    /// Reads what the user wrote: an address of [`Listen`] with `?id=`, `?columns=`, `?delimiter=`, `?where=` and
+    /// `?stamp=arrival`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with what is known.
+    pub fn parse(text: &str) -> Result<Listening> {
+        let (address, query) = text.split_once('?').unwrap_or((text, ""));
+        let refuse = |what: String| {
+            let what = format!("--listen {}: {what}", Address::from(text));
+            Error::usage(Diagnostic::new(what).help(LineParameters::HELP))
+        };
+        let parameters = remote::parameters(query)
+            .ok_or_else(|| refuse("a `%` needs two digits after it".to_owned()))?;
+        let mut names = parameters.iter().map(|(name, _)| name.as_str());
+        if let Some(other) = names.find(|name| !LineParameters::KEYS.contains(name)) {
+            let other = strapd_recording::text::printable(other);
+            return Err(refuse(format!("there is no ?{other}=")));
+        }
+        Ok(Listening {
+            address: Listen::parse(address)?,
+            lines: LineParameters::parse(&parameters).map_err(refuse)?,
+        })
+    }
+}
+
+impl From<Listen> for Listening {
+    fn from(address: Listen) -> Listening {
+        Listening {
+            address,
+            lines: LineParameters::default(),
+        }
+    }
+}
 
 /// Settings of a daemon.
 #[derive(Debug, Default)]
@@ -29,7 +76,7 @@ pub struct Settings {
     /// Settings of its hub.
     pub hub: hub::Settings,
     /// Addresses to listen on.
-    pub listen: Vec<Listen>,
+    pub listen: Vec<Listening>,
     /// Addresses to connect to for samples.
     pub sources: Vec<Endpoint>,
     /// Places where every attitude goes.
@@ -48,7 +95,7 @@ pub struct Settings {
 pub struct Server {
     hub: Arc<Hub>,
     web: Arc<Web>,
-    listeners: Vec<Listener>,
+    listeners: Vec<(Listener, Arc<Reading>)>,
     bound: Vec<Listen>,
     sources: Vec<(Endpoint, Arc<Outgoing>)>,
     outputs: Vec<Output>,
@@ -61,8 +108,8 @@ impl Settings {
     /// [`Error::Usage`] when a plan is none for live streams, or an address is open to others and no
     /// token is asked for.
     pub fn check(self) -> Result<()> {
-        for listen in &self.listen {
-            Reach::of(&self).check(listen)?;
+        for listening in &self.listen {
+            Reach::of(&self).check(&listening.address)?;
         }
         Hub::new(self.hub).map(|_| ())
     }
@@ -76,9 +123,11 @@ impl Server {
     /// no token is asked for; [`Error::Bind`].
     pub async fn bind(settings: Settings) -> Result<Server> {
         let reach = Reach::of(&settings);
-        for listen in &settings.listen {
-            reach.check(listen)?;
+        for listening in &settings.listen {
+            reach.check(&listening.address)?;
         }
+        let options = settings.hub.decode.clone();
+        let by_default = settings.hub.lines.clone();
         #[cfg(unix)]
         let mut passed = settings.passed;
         let sources: Vec<_> = settings
@@ -93,16 +142,18 @@ impl Server {
         let hub = Hub::new(settings.hub)?.fed_by(outgoing.collect());
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
-        for listen in &settings.listen {
+        for listening in &settings.listen {
+            let lines = listening.lines.clone().or(&by_default);
+            let reading = Arc::new(Reading::new(&options, &lines));
             let (listener, address) = Listener::bind(
-                listen,
+                &listening.address,
                 #[cfg(unix)]
                 &mut passed,
             )
             .await?;
             // Where a socket that was passed listens is known only now.
             reach.check(&address)?;
-            listeners.push(listener);
+            listeners.push((listener, reading));
             bound.push(address);
         }
         Ok(Server {
@@ -132,27 +183,29 @@ impl Server {
     pub async fn run(self, stop: impl Future<Output = ()>) -> bool {
         let shutdown = Shutdown::default();
         let places = Arc::new(Places::new(*self.hub.limits()));
-        let context = || Context {
+        let context = |reading: &Arc<Reading>| Context {
             hub: self.hub.clone(),
             web: self.web.clone(),
             places: places.clone(),
+            reading: reading.clone(),
             running: shutdown.running(),
         };
+        let usual = self.hub.reading();
         let answering = tokio::spawn(self.hub.clone().keep_answering());
-        for listener in self.listeners {
-            tokio::spawn(listener.serve(context()));
+        for (listener, reading) in self.listeners {
+            tokio::spawn(listener.serve(context(&reading)));
         }
         #[cfg(feature = "nats")]
         let tenancy = Arc::new(nats::tenure::LeaseWatch::default());
         for output in self.outputs {
             match output {
-                Output::Receiver(target) => tokio::spawn(forward::send(target, context())),
+                Output::Receiver(target) => tokio::spawn(forward::send(target, context(usual))),
                 #[cfg(feature = "nats")]
                 Output::Nats(address) => {
-                    tokio::spawn(nats::send(*address, context(), tenancy.clone()))
+                    tokio::spawn(nats::send(*address, context(usual), tenancy.clone()))
                 }
                 #[cfg(feature = "zenoh")]
-                Output::Zenoh(address) => tokio::spawn(zenoh::send(*address, context())),
+                Output::Zenoh(address) => tokio::spawn(zenoh::send(*address, context(usual))),
             };
         }
         for (endpoint, outgoing) in self.sources {

@@ -27,8 +27,9 @@ const ELSEWHERE: [(&str, &str); 3] = [
 ];
 
 /// Number of lines of a page that are not run here. A line more is to be looked at.
-const UNTESTED: [(&str, usize); 8] = [
+const UNTESTED: [(&str, usize); 9] = [
     ("README.md", 3),
+    ("docs/connect.md", 2),
     ("docs/estimation.md", 1),
     ("docs/inputs.md", 3),
     ("docs/performance.md", 10),

@@ -60,8 +60,9 @@ pub mod truncation;
 
 pub use crate::record::GyroUnit;
 pub use clock::{
-    BatchRate, Batches, Clock, ClockSpeed, ClockWarning, CoarseClock, Period, Sharing, SpeedPass,
-    SpeedVerdict, batches, choose_clock, choose_clock_as, sharing,
+    ArrivalClock, ArrivalReport, BatchRate, Batches, Clock, ClockSpeed, ClockWarning, CoarseClock,
+    MOST_ARRIVALS, Period, Sharing, SpeedPass, SpeedVerdict, batches, choose_clock,
+    choose_clock_as, sharing,
 };
 pub use histogram::Histogram;
 pub use memory::Memory;

@@ -4,6 +4,9 @@
 
 mod beside;
 mod packed;
+mod table_stream;
+
+pub use table_stream::{HeldRow, TableStream};
 
 use crate::columns::RowSelection;
 use crate::decode::packed::{HEAD, MARK, length};

@@ -36,6 +36,7 @@ use tables::{ChannelTable, ClientTable, SensorTable, Simulation};
 use super::channel::{Channel, Items};
 use super::outbox::Outbox;
 use super::outgoing::Outgoing;
+use super::reading::{LineParameters, Reading};
 use super::recorder::Handle;
 use super::stream::run::{OrderedBy, SampleRun};
 use super::stream::stamps::TimedSamples;
@@ -69,7 +70,8 @@ pub struct Hub {
     clients: ClientTable,
     channels: ChannelTable,
     simulation: Simulation,
-    decoder: LineDecoder,
+    reading: Arc<Reading>,
+    lines: LineParameters,
     decode_options: decode::Options,
     limits: Limits,
     token: Option<Token>,
@@ -205,7 +207,8 @@ impl Hub {
                 brings_samples: settings.brings_samples,
                 truth: Mutex::default(),
             },
-            decoder: LineDecoder::new(&settings.decode).with_besides(),
+            reading: Arc::new(Reading::new(&settings.decode, &settings.lines)),
+            lines: settings.lines,
             decode_options: settings.decode,
             limits: settings.limits,
             token: settings.token,
@@ -242,7 +245,25 @@ impl Hub {
     /// Decoder of the lines.
     #[must_use]
     pub fn decoder(&self) -> &LineDecoder {
-        &self.decoder
+        self.reading.decoder()
+    }
+
+    /// Way in which lines are read where their address says nothing else.
+    #[must_use]
+    pub(in crate::serve) fn reading(&self) -> &Arc<Reading> {
+        &self.reading
+    }
+
+    /// Parameters of lines where their address says nothing else.
+    #[must_use]
+    pub(in crate::serve) fn lines(&self) -> &LineParameters {
+        &self.lines
+    }
+
+    /// Whether the daemon was told the unit of rates.
+    #[must_use]
+    pub(in crate::serve) fn states_gyro_unit(&self) -> bool {
+        self.sensors.plan_of("").unit.is_some()
     }
 
     /// Options by which lines are read.

@@ -82,6 +82,7 @@ impl RunBuilder {
             lines: &self.lines,
             samples: self.samples.get(..until).unwrap_or(&self.samples),
             bare: &self.bare,
+            by_arrival: false,
             first: (self.first.0, &self.first.1),
         })
     }

@@ -10,13 +10,16 @@ mod line;
 mod losing;
 mod opening;
 mod resetting;
+mod rows;
 mod side;
 mod turn;
 mod unpacking;
 
 use super::hub::{Client, Complaint, Feedback, Hub, count};
 use super::owned::Owned;
+use super::reading::Reading;
 use super::run_builder::RunBuilder;
+use super::stream::run::SampleRun;
 use crate::serve::guard::fault::Fault;
 use crate::serve::guard::limits::Allowance;
 use crate::serve::guard::log_throttle;
@@ -25,6 +28,7 @@ use crate::serve::protocol::upstream::Event;
 use crate::serve::protocol::wire;
 use bytes::Bytes;
 use opening::Opening;
+use rows::Rows;
 pub use side::Side;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -55,6 +59,8 @@ pub enum End {
     Unauthorised,
     /// Beginning that is no object: somebody who speaks something else.
     NoObject,
+    /// Lines that are neither objects nor rows of a table.
+    NoTable,
 }
 
 impl End {
@@ -64,7 +70,8 @@ impl End {
         match self {
             End::TooManyErrors => "too many bad lines in a row",
             End::Unauthorised => "it has not shown the token",
-            End::NoObject => "it did not begin with an object",
+            End::NoObject => "it did not begin with an object or a table",
+            End::NoTable => "its lines are neither objects nor rows of a table",
         }
     }
 
@@ -74,7 +81,7 @@ impl End {
             log_throttle::warn(
                 "no object",
                 &format!(
-                    "{peer} did not begin with a JSON object and was closed; samples by HTTP go to POST /samples at a ws-listen:// address"
+                    "{peer} did not begin with a JSON object or a table and was closed; samples by HTTP go to POST /samples at a ws-listen:// address"
                 ),
             );
         }
@@ -88,6 +95,8 @@ pub struct Session {
     client: Arc<Client>,
     framer: Framer,
     side: Side,
+    reading: Arc<Reading>,
+    rows: Rows,
     authorised: bool,
     /// Whether its pages are our own.
     is_own_page: bool,
@@ -100,6 +109,8 @@ pub struct Session {
     /// Meaning of packed samples by number, as lines would state it.
     bound: BTreeMap<u32, Result<Line, Box<Fault>>>,
     step: WorkSlice,
+    /// Whether nothing more comes.
+    has_ended: bool,
     /// Bytes that wait for the next step.
     held: Option<PendingBytes>,
     /// Words it is told at the end, after a while.
@@ -134,7 +145,11 @@ impl Session {
         if let Some(place) = hub.place().filter(|_| authorised) {
             client.outbox.reply(place);
         }
+        let reading = hub.reading().clone();
         Session {
+            rows: Rows::taken(reading.takes_rows() && side.takes_rows() && hub.takes_samples()),
+            reading,
+            has_ended: false,
             authorised,
             is_own_page: false,
             opening,
@@ -152,6 +167,15 @@ impl Session {
             last_words: None,
             end: None,
         }
+    }
+
+    /// The same, whose lines are read in this way.
+    #[must_use]
+    pub fn reading(mut self, reading: Arc<Reading>) -> Session {
+        let are_taken = reading.takes_rows() && self.side.takes_rows();
+        self.rows = Rows::taken(are_taken && self.hub.takes_samples());
+        self.reading = reading;
+        self
     }
 
     /// The client, with its outbox.
@@ -327,6 +351,10 @@ impl Session {
             return;
         };
         self.step.worked = true;
+        let run = SampleRun {
+            by_arrival: self.reading.by_arrival,
+            ..run
+        };
         let news = self
             .owned
             .publish(&self.hub, &self.client, &run, &mut scratch.text);

@@ -7,6 +7,7 @@
 //! Long because a sensor is one state: who continues it, which sample is its next and what is known of it are read from the
 //! same fields. What is decided without them is in the files below.
 
+mod arrival;
 pub(super) mod attitude_now;
 pub(super) mod doubts;
 mod intervals;
@@ -24,6 +25,7 @@ use crate::serve::core::recorder::stream_of;
 use crate::serve::core::state::Saved;
 use crate::serve::guard::fault::Fault;
 use crate::sink::Stream;
+use arrival::Arrivals;
 use doubts::Doubts;
 use intervals::Intervals;
 pub use losing::Fate;
@@ -70,6 +72,8 @@ pub struct SensorStream {
     saved: Option<Saved>,
     /// The unit of stamps that do not say theirs.
     stamps: Stamps,
+    /// Clock of samples that have no stamp but their arrival.
+    arrivals: Option<Box<Arrivals>>,
     /// Fault to report of them.
     ambiguous: Option<Fault>,
     /// Why there is no unit.
@@ -163,6 +167,7 @@ impl SensorStream {
         let declared = Declared {
             sample_kind: stated.sample_kind,
             gyro_unit: stated.gyro_unit,
+            accel_unit: stated.accel_unit,
             ..Declared::default()
         };
         let resolved = Meaning::new(plan, &declared);
@@ -200,6 +205,7 @@ impl SensorStream {
             prepared,
             joining: Joining::Undecided,
             stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
+            arrivals: None,
             ambiguous: None,
             why_no_stamp: None,
             intervals: Intervals::default(),
@@ -280,12 +286,18 @@ impl SensorStream {
         self.counted = self.conditioning().counts;
         self.intervals.reopen();
         self.stamp_unit.meet();
+        self.arrivals = None;
     }
 
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
     /// are. Those whose stamps are bare numbers wait for the unit of all.
     pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<TimedSamples> {
         let bare = run.bare.iter().flatten().next();
+        let is_stamped = bare.is_some() || run.samples.iter().any(|raw| raw.header.is_some());
+        if run.by_arrival && !is_stamped {
+            let arrivals = self.arrivals.get_or_insert_default();
+            return Some(arrivals.take(run.lines, run.samples, run.received));
+        }
         if self.joining == Joining::Undecided
             && let Some(bare) = bare
             && !self.continues(*bare)
@@ -302,17 +314,21 @@ impl SensorStream {
     /// Whether samples wait for the unit of their stamps.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
-        self.stamps.is_waiting()
+        self.stamps.is_waiting() || self.arrivals.as_ref().is_some_and(|a| a.is_waiting())
     }
 
     /// Whether some have waited for the unit of their stamps for long enough.
     #[must_use]
     pub fn is_overdue(&self, now: Nanos) -> bool {
-        self.stamps.is_overdue(now)
+        let arrivals = self.arrivals.as_ref();
+        self.stamps.is_overdue(now) || arrivals.is_some_and(|a| a.is_overdue(now))
     }
 
     /// Takes those that wait for the unit of their stamps, when nobody is to wait any longer.
     pub fn overdue(&mut self) -> TimedSamples {
+        if let Some(arrivals) = self.arrivals.as_mut().filter(|a| a.is_waiting()) {
+            return arrivals.release();
+        }
         let (taken, why) = self.stamps.release(true);
         self.doubt(why);
         taken
@@ -650,6 +666,7 @@ impl SensorStream {
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "jitter_s": self.jitter_secs,
             "stamp_unit": self.stamps.unit().map(TimeUnit::name),
+            "arrival": self.arrivals.as_ref().map(|arrivals| arrivals.status()),
             "sample_kind": self.estimator.sample_kind().kind.name(),
             "sample_kind_by": self.estimator.sample_kind().reason.name(),
             "gyro_unit": self.resolved.unit.name(),
@@ -686,7 +703,7 @@ fn explained(verdict: Verdict) -> &'static str {
             "a sample older than what was already integrated; send in order, and after a connection was lost from the first sample on (a new run) or from the last one taken"
         }
         Verdict::NoStamp => {
-            "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or start the daemon with --time log to use the time of arrival"
+            "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or take the time of arrival: ?stamp=arrival behind the address (--stamp arrival of the daemon) makes it even, --time log takes it as it is"
         }
         Verdict::StrayStamp => "a stamp far ahead of its neighbours",
         Verdict::FarStamp => {

@@ -8,6 +8,7 @@
 use super::source::{Protocol, Source};
 use crate::client::link::{Heard, Link};
 use crate::client::remote::Remote;
+use crate::client::serial::{Legibility, SerialPlace};
 use crate::serve::core::hub::{Flood, Hub};
 use crate::serve::core::outgoing::Outgoing;
 use crate::serve::core::read_buffer::{now, with_read_buffer};
@@ -21,12 +22,14 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::task::yield_now;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 /// Longest message of a WebSocket that is read.
 const MAX_MESSAGE: usize = 128 << 10;
 /// A connection that stood so long was a good one: the waits begin anew.
 const STEADY: Duration = Duration::from_secs(1);
+/// Time after which it is judged whether the bytes of a serial port can be read.
+const LEGIBLE: Duration = Duration::from_secs(2);
 /// Asks a daemon for its samples: a simulation has some.
 const RATES: &str = r#"{"class":"WATCH","streams":["RATE"],"packed":true}"#;
 /// Asks a daemon that has none for its attitudes.
@@ -87,16 +90,18 @@ async fn converse(
     running: &mut Running,
 ) -> Option<String> {
     let side = Side::source(source.id.clone(), source.decoder(hub.decode_options()));
+    let reading = source.reading(hub.decode_options(), hub.lines());
     let mut talk = Talk {
         link,
         source,
         outgoing,
         hub,
-        session: Session::with(hub, source.name.clone(), side),
+        session: Session::with(hub, source.name.clone(), side).reading(Arc::new(reading)),
         bytes: Vec::new(),
         asked: source.protocol == Protocol::Strapd,
         asked_again: false,
         flood: Flood::default(),
+        legibility: serial(source).map(|_| Legibility::default()),
     };
     talk.go_on(running).await.err()
 }
@@ -114,6 +119,8 @@ struct Talk<'c> {
     asked: bool,
     asked_again: bool,
     flood: Flood,
+    /// Bytes of a serial port, until it is known whether they can be read.
+    legibility: Option<Legibility>,
 }
 
 impl Talk<'_> {
@@ -123,9 +130,15 @@ impl Talk<'_> {
     /// Why it ended before.
     async fn go_on(&mut self, running: &mut Running) -> Result<(), String> {
         self.introduce().await?;
+        let judged = sleep(LEGIBLE);
+        tokio::pin!(judged);
         loop {
             let heard = tokio::select! {
                 heard = next(&mut self.link, &mut self.bytes, &mut self.flood) => heard,
+                () = &mut judged, if self.legibility.is_some() => {
+                    self.judge_bytes();
+                    continue;
+                }
                 () = running.asked() => {
                     self.last_read().await;
                     return Ok(());
@@ -134,9 +147,15 @@ impl Talk<'_> {
             let ended = self.hear(heard).await;
             self.answer().await?;
             match self.session.end() {
+                Some(End::TooManyErrors | End::NoTable) if self.unreadable().is_some() => {
+                    return Err(self.unreadable().unwrap_or_default());
+                }
                 Some(End::TooManyErrors) => return Err("too many bad lines in a row".to_owned()),
                 Some(End::Unauthorised) => return Err("unauthorised".to_owned()),
                 Some(End::NoObject) => return Err("it speaks something else".to_owned()),
+                Some(End::NoTable) => {
+                    return Err("its lines are neither objects nor rows of a table".to_owned());
+                }
                 None => {}
             }
             if let Some(why) = ended {
@@ -144,6 +163,27 @@ impl Talk<'_> {
             }
             self.flood.wait(self.hub).await;
         }
+    }
+
+    /// Reports a serial port of which nothing came, or nothing that can be read.
+    fn judge_bytes(&mut self) {
+        let (Some(seen), Some(place)) = (self.legibility.take(), serial(self.source)) else {
+            return;
+        };
+        if seen.is_text() {
+            return;
+        }
+        let what = match seen.bytes() {
+            0 => "connected, and nothing came in 2 s: does the board send?".to_owned(),
+            bytes => place.unreadable(bytes),
+        };
+        self.outgoing.complain_of("bytes", &what);
+    }
+
+    /// Words for a serial port whose bytes are no text.
+    fn unreadable(&self) -> Option<String> {
+        let seen = self.legibility.as_ref().filter(|seen| !seen.is_text())?;
+        Some(serial(self.source)?.unreadable(seen.bytes()))
     }
 
     async fn say(&mut self, line: &str) -> Result<(), String> {
@@ -167,6 +207,9 @@ impl Talk<'_> {
     async fn hear(&mut self, heard: io::Result<Heard>) -> Option<String> {
         match heard {
             Ok(heard) => {
+                if let Some(seen) = &mut self.legibility {
+                    seen.take(&self.bytes);
+                }
                 take(&mut self.session, &heard, &self.bytes, self.outgoing).await;
                 match heard {
                     Heard::Bytes | Heard::Message => None,
@@ -219,6 +262,14 @@ impl Talk<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// The port of a source that is one.
+fn serial(source: &Source) -> Option<&SerialPlace> {
+    match &source.remote {
+        Remote::Serial(place) => Some(place),
+        _ => None,
     }
 }
 

@@ -18,15 +18,14 @@ use crate::client::remote::{Parameter, Remote};
 use crate::client::secret::Secret;
 use crate::error::{Error, Result};
 use crate::serve::core::outgoing::Outgoing;
+use crate::serve::core::reading::{LineParameters, Reading};
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_recording::decode::{LineDecoder, Options, exact_name};
+use strapd_recording::decode::{LineDecoder, Options};
 use strapd_recording::text::printable;
 
-/// Longest name of a sensor, in bytes.
-const MAX_ID: usize = crate::serve::protocol::wire::MAX_ID;
-/// The parameters that are ours.
-const OURS: [&str; 3] = ["id", "proto", "token-file"];
+/// The parameters that are ours beside those of lines.
+const OURS: [&str; 2] = ["proto", "token-file"];
 
 /// Something to connect to for samples.
 #[derive(Clone, Debug)]
@@ -39,8 +38,21 @@ pub struct Source {
     pub protocol: Protocol,
     /// Token that it wants to see first.
     pub token: Option<Secret>,
+    /// Way in which its lines are read.
+    pub lines: LineParameters,
     /// Address for people: of the query the names, and the values that are ours and no secret.
     pub name: String,
+}
+
+/// The sensor's name among the parameters of an address.
+fn lines_id(parameters: &[Parameter]) -> Option<&str> {
+    let mut named = parameters.iter().filter(|(name, _)| name == "id");
+    named.next().map(|(_, id)| id.as_str())
+}
+
+/// Whether a parameter of an address is for us, and not for a server.
+fn is_ours(parameter: &str) -> bool {
+    OURS.contains(&parameter) || LineParameters::KEYS.contains(&parameter)
 }
 
 /// Place from which samples are fetched.
@@ -202,16 +214,14 @@ impl Source {
     /// # Errors
     /// [`Error::Usage`] with what is known; the token file cannot be read.
     pub fn parse(text: &str) -> Result<Source> {
-        let (remote, parameters) = Remote::with_parameters(text, |p| OURS.contains(&p))?;
+        let (remote, parameters) = Remote::with_parameters(text, is_ours)?;
         let refuse = |what: String| {
             let shown = Address::from(text);
             Error::usage(
-                Diagnostic::new(format!(
-                    "serve {shown}: {what}"
-                ))
-                .help(
-                    "?id=NAME names the sensor; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE",
-                )
+                Diagnostic::new(format!("serve {shown}: {what}")).help(format!(
+                    "{}; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE",
+                    LineParameters::HELP
+                )),
             )
         };
         if matches!(remote, Remote::UdpListen(_)) {
@@ -223,6 +233,7 @@ impl Source {
             ));
         }
         let is_web = matches!(remote, Remote::WebSocket { .. });
+        let is_serial = matches!(remote, Remote::Serial(_)) && lines_id(&parameters).is_none();
         let of = |name: &str| {
             let mut values = parameters.iter().filter(|(n, _)| n == name);
             match (values.next(), values.next()) {
@@ -231,19 +242,10 @@ impl Source {
                 (None, Some(_)) => Ok(None),
             }
         };
-        if let Some((other, _)) = parameters
-            .iter()
-            .find(|(n, _)| !is_web && !OURS.contains(&n.as_str()))
-        {
+        if let Some((other, _)) = parameters.iter().find(|(n, _)| !is_web && !is_ours(n)) {
             return Err(refuse(format!("there is no ?{other}=")));
         }
-        let id = match of("id")? {
-            None => None,
-            Some(id) if id.is_empty() || id.len() > MAX_ID => {
-                return Err(refuse(format!("?id= needs a name of 1 to {MAX_ID} bytes")));
-            }
-            Some(id) => Some(exact_name(id).map_err(|why| refuse(format!("?id=: {why}")))?),
-        };
+        let lines = LineParameters::parse(&parameters).map_err(refuse)?;
         let phone = match &remote {
             Remote::WebSocket { resource, .. } => {
                 let asked = resource.typed();
@@ -271,13 +273,34 @@ impl Source {
         let token = of("token-file")?
             .map(|file| Secret::read("token-file", Path::new(file)))
             .transpose()?;
+        let mut lines = lines;
+        if let Remote::Serial(place) = &remote {
+            // A board has no other name.
+            lines.id.get_or_insert_with(|| place.sensor());
+        }
         Ok(Source {
-            id,
+            id: lines.id.clone().filter(|_| !is_serial),
+            lines,
             protocol,
             token,
             name: named(&remote, &parameters),
             remote,
         })
+    }
+
+    /// Way in which its lines are read, of a daemon with these options, and `by_default` where its address says nothing.
+    #[must_use]
+    pub(in crate::serve) fn reading(
+        &self,
+        options: &Options,
+        by_default: &LineParameters,
+    ) -> Reading {
+        let reading = Reading::new(options, &self.lines.clone().or(by_default));
+        match self.protocol {
+            Protocol::Auto if matches!(self.remote, Remote::Serial(_)) => reading.joined_midway(),
+            Protocol::Auto => reading,
+            Protocol::Lines | Protocol::Strapd | Protocol::SensorServer(_) => reading.of_objects(),
+        }
     }
 
     /// Decoder of its lines, if it is not the one of everybody's.
@@ -296,7 +319,7 @@ impl Source {
 fn named(remote: &Remote, parameters: &[Parameter]) -> String {
     let mut name = remote.to_string();
     for (parameter, value) in parameters {
-        if ["id", "proto"].contains(&parameter.as_str()) {
+        if is_ours(parameter) && parameter != "token-file" {
             name.push(if name.contains('?') { '&' } else { '?' });
             name.push_str(&format!("{parameter}={}", printable(value)));
         }
@@ -327,6 +350,12 @@ mod tests {
         assert_eq!(of("ws://p:8765/ws").protocol, Protocol::Auto);
         assert_eq!(of("tcp://p:1?proto=ndjson").protocol, Protocol::Lines);
         assert_eq!(of("tcp://p:1?proto=strapd").protocol, Protocol::Strapd);
+        let board = of("serial:///dev/ttyACM0?baud=9600&stamp=arrival");
+        assert_eq!(board.lines.id.as_deref(), Some("ttyACM0"));
+        assert_eq!((board.id, board.lines.by_arrival), (None, true));
+        assert_eq!(board.name, "serial:///dev/ttyACM0?baud=9600&stamp=arrival");
+        let named = of("serial:///dev/ttyACM0?id=left");
+        assert_eq!(named.id.as_deref(), Some("left"));
     }
 
     #[test]
@@ -342,6 +371,9 @@ mod tests {
             ("tcp://p:1?proto=mqtt", "no ?proto=mqtt"),
             ("udp-listen://:1", "--listen udp-listen://127.0.0.1:1"),
             ("flight.mcap", "no scheme"),
+            ("serial://dev/ttyUSB0", "an absolute path"),
+            ("serial:///dev/ttyUSB0?bauds=9600", "no ?bauds="),
+            ("serial:///dev/ttyUSB0?baud=9", "is no rate"),
         ] {
             let said = Source::parse(text).unwrap_err().to_string();
             assert!(said.contains(part), "{text}: {said}");

@@ -347,7 +347,9 @@ pub fn no_object(beginning: &[u8], takes_samples: bool) -> Fault {
     };
     Fault::new(
         "not_an_object",
-        format!("{what}; a connection begins with one JSON object on a line; {where_to}"),
+        format!(
+            "{what}; a connection begins with one JSON object on a line, or with the header of a table; {where_to}"
+        ),
     )
 }
 
@@ -356,6 +358,18 @@ fn is_http(beginning: &[u8]) -> bool {
     let method = beginning.iter().take_while(|b| b.is_ascii_uppercase());
     let letters = method.count();
     letters > 0 && beginning.get(letters) == Some(&b' ')
+}
+
+/// Whether a whole line is the first of a request of HTTP: of a browser it always is.
+#[must_use]
+pub fn is_request(line: &[u8]) -> bool {
+    const METHODS: [&str; 10] = [
+        "GET", "POST", "HEAD", "PUT", "OPTIONS", "DELETE", "PATCH", "CONNECT", "TRACE", "PRI",
+    ];
+    let line = line.trim_ascii();
+    let first = line.split(|b| *b == b' ').next().unwrap_or_default();
+    let is_method = METHODS.iter().any(|method| method.as_bytes() == first);
+    (is_method && is_http(line)) || line.windows(6).any(|part| part == b" HTTP/")
 }
 
 fn line(value: &Value) -> Bytes {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use strapd::serve::core::hub::Hub;
-use strapd::serve::{Server, Settings};
+use strapd::serve::{Listening, Server, Settings};
 use strapd::sink::address::Listen;
 
 /// Longer than anything here takes on a busy machine.
@@ -25,7 +25,7 @@ pub(crate) struct Daemon {
 /// Settings that listen on these.
 pub(crate) fn listening(uris: &[&str]) -> Settings {
     Settings {
-        listen: uris.iter().map(|u| Listen::parse(u).unwrap()).collect(),
+        listen: uris.iter().map(|u| Listening::parse(u).unwrap()).collect(),
         ..Settings::default()
     }
 }

@@ -82,7 +82,7 @@ fn samples_behind_anything_but_an_object_are_never_read() {
 fn the_first_byte_decides_wherever_it_comes_and_at_once() {
     let daemon = Daemon::tcp();
     // No line end comes, and none is waited for.
-    for first in ["G", "\r\n\r\n \n[", "\u{16}"] {
+    for first in ["\u{1}", "\r\n\r\n \n[", "\u{16}"] {
         let mut client = Client::tcp(daemon.address(0));
         client.object("VERSION");
         client.send_bytes(&first.as_bytes()[..first.len() - 1]);
@@ -93,6 +93,14 @@ fn the_first_byte_decides_wherever_it_comes_and_at_once() {
         assert_eq!(error["line"], lines, "{error}");
         assert_eq!(client.line(), None);
     }
+    // Text may be of a table: its first line decides.
+    let mut client = Client::tcp(daemon.address(0));
+    client.object("VERSION");
+    for byte in b"GET / HTTP/1.1\r\n" {
+        client.send_bytes(&[*byte]);
+    }
+    assert_eq!(client.object("ERROR")["code"], "not_an_object");
+    assert_eq!(client.line(), None);
     // Blank lines before an object, an object of which nobody knows the use, and one byte after the
     // other: all this may be.
     let mut client = Client::tcp(daemon.address(0));

@@ -183,7 +183,7 @@ fn a_sensor_is_seen_and_a_daemon_that_comes_back_too() {
     assert!(daemon.stop());
     terminal.until("NOT CONNECTED");
     let mut settings = listening(&[]);
-    settings.listen = vec![Listen::Tcp(address)];
+    settings.listen = vec![Listen::Tcp(address).into()];
     let daemon = Daemon::start(settings);
     terminal.until("1 sensor  connected");
     let _sender = turning(&daemon, "second");

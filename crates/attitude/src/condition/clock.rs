@@ -3,6 +3,7 @@
 //! A stage of its own because a sample carries up to three clocks, of which any can be absent,
 //! zero or standing still, and the choice decides every interval after it.
 
+mod arrivals;
 mod batch_line;
 mod batches;
 mod coarse;
@@ -12,6 +13,7 @@ mod speed;
 mod steps;
 mod unwrap;
 
+pub use arrivals::{ArrivalClock, ArrivalReport, MOST_ARRIVALS};
 pub(super) use batch_line::BatchLine;
 pub use batches::{BatchRate, Batches, batches};
 pub use coarse::{CoarseClock, Sharing, sharing};

@@ -226,6 +226,16 @@ impl Opening {
         }
     }
 
+    /// Whether the header, or of a table without one the first row, was found.
+    pub(crate) fn has_header(&self) -> bool {
+        self.found.is_some()
+    }
+
+    /// Number of lines before it.
+    pub(crate) fn before_header(&self) -> usize {
+        self.found.map_or(self.lines.len(), |found| found.at)
+    }
+
     fn header(&self, line: &[u8]) -> Option<HeaderLine> {
         let at = self.lines.len();
         let found = |at, delimiter, is_header, is_own| HeaderLine {

@@ -431,6 +431,7 @@ impl Table {
                 Whose::Others => self.declared.gyro_unit,
                 _ => gyro.map(|_| crate::decode::GyroUnit::Rad),
             },
+            accel_unit: self.declared.accel_unit,
             ..Line::default()
         };
         line.decoded.samples = 1;

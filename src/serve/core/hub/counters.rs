@@ -22,6 +22,8 @@ pub struct Counters {
     pub closed: AtomicU64,
     /// Lines and packed objects received.
     pub lines: AtomicU64,
+    /// Lines before the first sample of a connection that were skipped.
+    pub skipped_lines: AtomicU64,
     /// Bytes received.
     pub bytes_in: AtomicU64,
     /// Bytes sent.
@@ -59,7 +61,7 @@ impl Hub {
 impl Counters {
     /// Each, in a fixed order.
     #[must_use]
-    pub fn named(&self) -> [Counter; 15] {
+    pub fn named(&self) -> [Counter; 16] {
         let counter = |name, counts, n: &AtomicU64| Counter {
             name,
             counts,
@@ -90,6 +92,11 @@ impl Counters {
                 "lines",
                 "Lines, packed objects, posted objects and viewers' messages received, blank and bad ones among them.",
                 &self.lines,
+            ),
+            counter(
+                "lines_skipped",
+                "Lines before the first sample of a connection, or the header of its table, that were skipped.",
+                &self.skipped_lines,
             ),
             counter(
                 "bytes_in",

@@ -1,5 +1,6 @@
 //! Settings of a hub. Data.
 
+use crate::serve::core::reading::LineParameters;
 use crate::serve::core::{recorder, state};
 use crate::serve::guard::admission::Token;
 use crate::serve::guard::limits::Limits;
@@ -13,6 +14,8 @@ use strapd_attitude::estimate::EstimationSettings;
 pub struct Settings {
     /// Options by which lines are read, for every sensor: that is done before it is known whose they are.
     pub decode: strapd_recording::decode::Options,
+    /// Way in which lines are read where their address says nothing else.
+    pub lines: LineParameters,
     /// Settings by which samples are understood and integrated.
     pub plan: EstimationSettings,
     /// Settings for sensors that are understood in another way, by `id`.

@@ -1,6 +1,7 @@
 //! A line of a client -> samples gathered, or what it asks for done. Pure but for locks.
 
 use super::opening::Opening;
+use super::rows::Rows;
 use super::{MAX_TOLD, Scratch, Session, Side, first_line_must_be_auth};
 use crate::serve::core::hub::count;
 use crate::serve::guard::fault::{Fault, Kind};
@@ -15,12 +16,25 @@ impl Session {
     /// A line, with its number.
     pub(super) fn line(&mut self, said: (u64, &[u8]), received: Nanos, scratch: &mut Scratch) {
         let (number, line) = said;
+        if !self.has_spoken() && self.opening == Opening::Text {
+            if wire::is_request(line) {
+                return self.refuse_opening(number, line);
+            }
+            self.opening = Opening::Over;
+            self.rows = Rows::Open { is_strict: true };
+        }
+        if self.is_row(line) {
+            return self.row(said, received, scratch);
+        }
+        if self.is_strict() {
+            return self.refuse_opening(number, line);
+        }
         let before = scratch.run.samples.len();
         let decoder = match &self.side {
             Side::Source(naming) => naming.decoder.as_ref(),
             Side::Client { .. } | Side::ListenOnly { .. } => None,
         };
-        let decoder = decoder.unwrap_or(self.hub.decoder());
+        let decoder = decoder.unwrap_or(&self.reading.decoder);
         let samples = &mut scratch.run.samples;
         let read = wire::read_from(decoder, line, received, self.side.is_source(), samples);
         if !self.has_spoken() {
@@ -38,7 +52,10 @@ impl Session {
                 scratch.run.samples.truncate(before);
                 self.refuse(&first_line_must_be_auth(), number);
             }
-            Ok(Message::Samples(head)) => self.gather(head, before, said, received, scratch),
+            Ok(Message::Samples(head)) => {
+                self.settle_on_objects();
+                self.gather(head, before, said, received, scratch);
+            }
             Ok(Message::Packed(stream, head)) => self.bind(stream, head, said, received, scratch),
             Err(fault) if fault.kind == Kind::UnknownClass && self.side.is_source() => {
                 self.note_event(line);
@@ -85,7 +102,7 @@ impl Session {
     }
 
     /// Gathers the samples from `before` on, of a line of this head.
-    fn gather(
+    pub(super) fn gather(
         &mut self,
         mut head: Line,
         before: usize,
@@ -101,6 +118,9 @@ impl Session {
             scratch.run.samples.truncate(before);
             self.say(&fault, said.0, said.1);
             return self.lose(&fault, said.0, said.1);
+        }
+        if head.id.is_none() {
+            head.id.clone_from(&self.reading.id);
         }
         if !self.hub.takes_samples() {
             return self.not_taken(said, before, received, scratch);

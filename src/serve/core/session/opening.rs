@@ -3,6 +3,7 @@
 //! Apart from the lines because it must be judged before there is one: a browser can be made to send a
 //! request to any port, and what follows in its body would otherwise be lines like any others.
 
+use super::rows::Rows;
 use super::{End, Session, first_line_must_be_auth};
 use crate::serve::guard::fault::Fault;
 use crate::serve::protocol::wire;
@@ -16,6 +17,9 @@ pub(super) enum Opening {
     Blank,
     /// A line has begun as an object, or as a packed one.
     Begun,
+    /// A line has begun as text: of a table, or a device that says what it is before its header. Its whole first line
+    /// decides.
+    Text,
     /// Conversation that was accepted.
     Over,
 }
@@ -30,6 +34,10 @@ impl Session {
                     self.opening = Opening::Begun;
                     return true;
                 }
+                if self.may_begin_table(*first) {
+                    self.opening = Opening::Text;
+                    return true;
+                }
                 let blank = bytes.get(..blank).unwrap_or_default();
                 let lines = memchr::memchr_iter(b'\n', blank).count() as u64;
                 self.refuse_opening(self.framer.ended() + lines + 1, rest);
@@ -37,6 +45,14 @@ impl Session {
             }
             _ => true,
         }
+    }
+
+    /// Whether a conversation whose first byte is this may be of a table: text, or the mark before it. What a browser can
+    /// be made to send is text, too, and is refused by its first line ([`wire::is_request`]).
+    fn may_begin_table(&self, first: u8) -> bool {
+        const FIRST_OF_MARK: u8 = 0xef;
+        let is_text = (b' '..0x7f).contains(&first) || first == FIRST_OF_MARK;
+        is_text && first != b'[' && self.authorised && !matches!(self.rows, Rows::Never)
     }
 
     /// Refuses one that does not begin with an object: nothing of it, and nothing behind it, is read.

@@ -60,6 +60,14 @@ impl Side {
         matches!(self, Side::ListenOnly { .. })
     }
 
+    /// Whether its lines may be rows of a table: not where a message says whose it is, or a phone what it is.
+    pub(super) fn takes_rows(&self) -> bool {
+        match self {
+            Side::Client { .. } | Side::ListenOnly { .. } => true,
+            Side::Source(naming) => naming.subject.is_none() && naming.decoder.is_none(),
+        }
+    }
+
     /// Whether it speaks for many sensors.
     pub(super) fn is_broker(&self) -> bool {
         matches!(self, Side::Source(naming) if naming.subject.is_some())

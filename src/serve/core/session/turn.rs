@@ -54,6 +54,7 @@ impl Session {
 
     /// The stream has ended: what is unfinished is a line.
     pub fn finish(&mut self, received: Nanos, scratch: &mut Scratch) {
+        self.has_ended = true;
         self.add(&[], true, received, scratch);
     }
 
@@ -154,6 +155,9 @@ impl Session {
         let rest = framer.feed(bytes, &mut take).len();
         if whole && rest == 0 {
             framer.finish(&mut take);
+        }
+        if self.has_ended && rest == 0 && self.end.is_none() {
+            self.finish_rows(scratch);
         }
         count(&self.hub.counters.lines, (framer.ended() - before) as usize);
         self.framer = framer;

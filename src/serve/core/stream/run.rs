@@ -37,6 +37,8 @@ pub struct SampleRun<'a> {
     pub samples: &'a [RawSample],
     /// Stamps that are numbers without a unit, at their places; shorter where no more follow.
     pub bare: &'a [Option<Bare>],
+    /// Whether a sample without a stamp has that of its arrival.
+    pub by_arrival: bool,
     /// The number of the first line, 0 where it has none, and its beginning.
     pub first: (u64, &'a [u8]),
 }

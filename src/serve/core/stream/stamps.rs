@@ -38,6 +38,19 @@ pub struct TimedSamples {
     pub samples: Vec<RawSample>,
 }
 
+impl TimedSamples {
+    /// Adds a sample of the line with this number.
+    pub(super) fn push(&mut self, seq: Option<u64>, sample: RawSample) {
+        self.samples.push(sample);
+        let end = self.samples.len();
+        match self.lines.last_mut() {
+            // Several samples of one line.
+            Some((last, last_end)) if seq.is_some() && *last == seq => *last_end = end,
+            _ => self.lines.push((seq, end)),
+        }
+    }
+}
+
 impl Stamps {
     pub(super) fn new(unit: Option<TimeUnit>) -> Stamps {
         Stamps {
@@ -128,16 +141,8 @@ impl Stamps {
         let mut taken = TimedSamples::default();
         for (seq, sample, bare) in self.waiting.drain(..) {
             let stamp = bare.zip(unit).map(|(bare, unit)| bare.in_unit(unit));
-            taken.samples.push(RawSample {
-                header: sample.header.or(stamp),
-                ..sample
-            });
-            let end = taken.samples.len();
-            match taken.lines.last_mut() {
-                // Several samples of one line.
-                Some((last, last_end)) if seq.is_some() && *last == seq => *last_end = end,
-                _ => taken.lines.push((seq, end)),
-            }
+            let header = sample.header.or(stamp);
+            taken.push(seq, RawSample { header, ..sample });
         }
         (taken, why)
     }

@@ -1,6 +1,7 @@
 //! An HTTP connection, as those who answer its requests know it.
 
 use crate::serve::core::hub::Hub;
+use crate::serve::core::reading::Reading;
 use crate::serve::edge::samples::posters::Posters;
 use crate::serve::guard::peer::Peer;
 use crate::serve::guard::places::Place;
@@ -21,6 +22,8 @@ pub(crate) struct Connection {
     /// A browser says that the request is of a page it has from here.
     pub(crate) is_own_page: bool,
     pub(crate) running: Running,
+    /// Way in which lines of a WebSocket are read.
+    pub(crate) reading: Arc<Reading>,
     /// Held as long as the connection, or the WebSocket it becomes, lives.
     pub(crate) place: Arc<Place>,
 }

@@ -117,9 +117,12 @@ impl Pending {
 /// Serves one client to the end of its conversation.
 pub(super) async fn converse(io: impl Duplex, peer: Peer, context: Context, place: Place) {
     let Context {
-        hub, mut running, ..
+        hub,
+        mut running,
+        reading,
+        ..
     } = context;
-    let mut session = Session::new(&hub, peer, false);
+    let mut session = Session::new(&hub, peer, false).reading(reading);
     let client = session.client().clone();
     place.serves(client.clone());
     let reason = {

@@ -49,6 +49,7 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
                 trusted: false,
                 is_own_page: false,
                 running: context.running.clone(),
+                reading: context.reading.clone(),
                 place: place.clone(),
             };
             let (router, web) = (router.clone(), context.web.clone());

@@ -47,9 +47,9 @@ pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
                 tracing::info!("standard input has ended");
                 return;
             }
-            Ok(_) if session.end().is_none() => {}
             Ok(_) => {
-                tracing::warn!("standard input: too many bad lines; it is read no further");
+                let Some(end) = session.end() else { continue };
+                tracing::warn!("standard input: {}; it is read no further", end.reason());
                 return;
             }
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}

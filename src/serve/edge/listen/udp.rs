@@ -26,7 +26,10 @@ struct Sender {
 
 pub(super) async fn serve(socket: UdpSocket, context: Context) {
     let Context {
-        hub, mut running, ..
+        hub,
+        mut running,
+        reading,
+        ..
     } = context;
     let silence = hub.limits().sender_silence;
     let mut senders: HashMap<SocketAddr, Sender> = HashMap::new();
@@ -51,7 +54,8 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                         &hub,
                         Peer::at("udp", peer),
                         Side::ListenOnly { trusted: false },
-                    ),
+                    )
+                    .reading(reading.clone()),
                     heard: Instant::now(),
                 });
                 sender.heard = Instant::now();

@@ -56,11 +56,14 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         is_own_page,
         running,
         place,
+        reading,
         ..
     } = connection;
     let session = match foxglove {
         None => Talk::Lines(Box::new(
-            Session::new(&hub, peer, trusted).of_own_page(is_own_page),
+            Session::new(&hub, peer, trusted)
+                .of_own_page(is_own_page)
+                .reading(reading),
         )),
         Some(controls) => Talk::Foxglove(Viewer::new(&hub, peer, controls)),
     };

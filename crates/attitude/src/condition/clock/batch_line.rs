@@ -9,6 +9,9 @@ use super::batches::{BatchRate, SHORT, usual_size};
 const LOST: f64 = 0.75;
 /// An arrival earlier than the line by this part of a batch proves the line wrong: nothing comes before it was taken.
 const EARLY: f64 = 0.5;
+/// Mean distances of an arrival from the line within which it proves nothing, and the share of a new one in the mean.
+const SLACK: f64 = 8.0;
+const OFF_GAIN: f64 = 1.0 / 64.0;
 /// Least gains of place and of step.
 const PLACE_GAIN: f64 = 0.02;
 const STEP_GAIN: f64 = 2e-4;
@@ -34,6 +37,11 @@ pub(crate) struct BatchLine {
     sizes: Vec<i64>,
     closed: f64,
     out: Option<i64>,
+    /// Mean distance of the arrivals from the line, where they are no stamps of a log: so much later than it none proves
+    /// that a batch was lost.
+    off: Option<f64>,
+    /// Batches in a row that moved the line.
+    astray: u32,
 }
 
 impl BatchLine {
@@ -51,12 +59,64 @@ impl BatchLine {
             sizes: vec![size],
             closed: 0.0,
             out: None,
+            off: None,
+            astray: 0,
         }
     }
 
     /// Gives no stamp before this one, or at it.
     pub(crate) fn begin_after(&mut self, stamp: i64) {
         self.out = Some(stamp);
+    }
+
+    /// Makes one that goes on from a line with this step through arrivals, `offset` after the first of them at its sample
+    /// number 0, from which they are `off` in the mean. `beginnings` are the samples that begin a batch.
+    pub(crate) fn on(
+        step: f64,
+        offset: f64,
+        off: f64,
+        (beginnings, arrivals): (&[usize], &[i64]),
+    ) -> BatchLine {
+        let base = arrivals.first().copied();
+        let index = |at: usize| i64::try_from(at).unwrap_or(i64::MAX);
+        let after = |at: usize| {
+            let arrival = arrivals.get(at).copied().or(base).unwrap_or_default();
+            arrival.saturating_sub(base.unwrap_or_default()) as f64
+        };
+        let begun = beginnings.last().copied().unwrap_or_default();
+        let newest = arrivals.len().saturating_sub(1);
+        let sizes = beginnings.windows(2).map(|pair| match pair {
+            [from, to] => index(to - from),
+            _ => 1,
+        });
+        let sizes: Vec<i64> = sizes.collect();
+        let forgotten = sizes.len().saturating_sub(SIZES);
+        let last = index(begun) - 1;
+        let on_line = offset + step * newest as f64;
+        BatchLine {
+            base,
+            at: offset + step * last as f64,
+            last,
+            step,
+            number: index(newest),
+            start: after(begun),
+            before: after(newest),
+            sizes: sizes.get(forgotten..).unwrap_or_default().to_vec(),
+            closed: beginnings.len().saturating_sub(1).max(1) as f64,
+            out: base.map(|base| base.saturating_add(on_line.round() as i64)),
+            off: Some(off),
+            astray: 0,
+        }
+    }
+
+    /// Ordinary number of samples in a batch.
+    pub(crate) fn usual_size(&self) -> f64 {
+        usual_size(&self.sizes)
+    }
+
+    /// Number of batches in a row that moved the line: of many the rate is another one.
+    pub(crate) fn astray(&self) -> u32 {
+        self.astray
     }
 
     /// The step, nanoseconds.
@@ -66,21 +126,38 @@ impl BatchLine {
 
     /// Takes the stamp of the next sample and returns that of the line; always later than the one before.
     pub(crate) fn push(&mut self, stamp: i64) -> i64 {
+        self.push_together(stamp, 1)
+    }
+
+    /// The same of a sample with which, itself among them, so many are known to have come.
+    pub(crate) fn push_together(&mut self, stamp: i64, together: usize) -> i64 {
         let base = *self.base.get_or_insert(stamp);
         let s = stamp.saturating_sub(base) as f64;
         self.number += 1;
         if self.number > 0 && s - self.before >= SHORT * self.step {
             self.close(self.number - 1);
             self.start = s;
-            let most = self.sizes.iter().copied().max().unwrap_or(1) as f64;
+            let together = i64::try_from(together).unwrap_or(i64::MAX);
+            let most = self.sizes.iter().copied().max().unwrap_or(1);
+            let most = most.max(together) as f64;
             // Later than with as many as were ever in one of late.
             let late = s - (self.at + self.step * most);
-            if late > LOST * self.step * most.max(2.0) {
+            if late > LOST * self.step * most.max(2.0) + SLACK * self.off.unwrap_or(0.0) {
                 self.at += late;
+                self.astray += 1;
             }
         }
         self.before = s;
-        let on_line = self.at + self.step * (self.number - self.last) as f64;
+        let mut on_line = self.at + self.step * (self.number - self.last) as f64;
+        if let Some(off) = self.off {
+            let usual = self.usual_size().max(2.0);
+            // Nothing is sampled so long after it came: the rate is higher, or what was lost had only stalled.
+            if on_line - s > EARLY * self.step * usual + SLACK * off {
+                (self.at, self.last, self.start) = (s, self.number, s);
+                self.astray += 1;
+                on_line = s;
+            }
+        }
         let stamp = base.saturating_add(on_line.round() as i64);
         let stamp = self
             .out
@@ -105,11 +182,17 @@ impl BatchLine {
             self.sizes.remove(0);
         }
         self.sizes.push(n);
-        let is_behind_lost = off > LOST * self.step * usual_size(&self.sizes).max(2.0);
+        let slack = SLACK * self.off.unwrap_or(0.0);
+        let is_behind_lost = off > LOST * self.step * usual_size(&self.sizes).max(2.0) + slack;
         self.last = k;
         if is_behind_lost || off < -EARLY * self.step * count.max(2.0) {
             self.at = self.start;
+            self.astray += 1;
             return;
+        }
+        self.astray = 0;
+        if let Some(mean) = &mut self.off {
+            *mean += OFF_GAIN * (off.abs() - *mean);
         }
         // How late it came is no measure of when it was taken.
         let off = off.min(EARLY * self.step * count);

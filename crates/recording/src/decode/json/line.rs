@@ -10,7 +10,7 @@ use super::scan::Scanner;
 use crate::decode::refusal::exact_name;
 use crate::decode::{Bare, Decoded, GyroUnit, Options, Undecodable};
 use crate::text::printable;
-use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+use strapd_attitude::record::{AccelUnit, Nanos, RawSample, SampleKind};
 
 /// Longest line that is read.
 pub const MAX_LINE: usize = 64 << 10;
@@ -47,6 +47,8 @@ pub struct Line {
     pub sample_kind: Option<SampleKind>,
     /// Unit of its body rate, where it says so.
     pub gyro_unit: Option<GyroUnit>,
+    /// Unit of its specific force, where that is known: of a row by its table's columns.
+    pub accel_unit: Option<AccelUnit>,
     /// Number of samples, and what was noticed.
     pub decoded: Decoded,
     /// Stamps that are numbers without a unit, at the places of their samples, which have none until
@@ -156,6 +158,7 @@ impl LineDecoder {
             seq: seeker.seq,
             sample_kind: seeker.kind.as_deref().and_then(SampleKind::named).or(kind),
             gyro_unit: unit.or(stated),
+            accel_unit: None,
             decoded,
             bare,
         })
