@@ -56,7 +56,10 @@ impl Session {
                 self.settle_on_objects();
                 self.gather(head, before, said, received, scratch);
             }
-            Ok(Message::Packed(stream, head)) => self.bind(stream, head, said, received, scratch),
+            Ok(Message::Packed(stream, head)) => {
+                self.settle_on_objects();
+                self.bind(stream, head, said, received, scratch);
+            }
             Err(fault) if fault.kind == Kind::UnknownClass && self.side.is_source() => {
                 self.note_event(line);
             }

@@ -135,6 +135,7 @@ impl Session {
                 Framed::Line(number, line) => self.line((number, line), received, scratch),
                 Framed::Packed(number, object) => {
                     self.opening = Opening::Over;
+                    self.settle_on_objects();
                     self.packed(number, object, received, scratch);
                 }
                 Framed::TooLong(number, head) if self.has_spoken() => {
