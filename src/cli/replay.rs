@@ -210,7 +210,8 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
                 outputs::make_folders(&args.outputs, &names)?;
                 Ok(run)
             })
-            .and_then(|(mut run, served)| {
+            .and_then(|(mut run, mut served)| {
+                served.look_through(&run, global.threads);
                 served.run(|again| {
                     if again {
                         run.targets.retain(|target| target.listens().is_some());

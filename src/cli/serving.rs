@@ -4,16 +4,21 @@ use super::admission::Admission;
 use super::{Outcome, replay};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::Audience;
+use crate::pipeline::replay as pipeline;
+use crate::pipeline::request::ReplayRequest;
 use crate::serve::Settings;
 use crate::serve::core::hub;
 use crate::serve::playback::controls::Playback;
+use crate::serve::playback::overview::Overview;
 use crate::serve::playback::server::{Next, PlaybackServer};
 use crate::sink::Target;
 use crate::sink::address::Listen;
 use clap::Args;
 use std::path::Path;
 use std::sync::Arc;
+use std::thread::JoinHandle;
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_recording::pool::Pool;
 
 /// Address of the page when none is given: beside the daemon's.
 const PAGE: &str = "127.0.0.1:8766";
@@ -48,6 +53,24 @@ pub(super) struct Served {
     cast: Option<Arc<PlaybackServer>>,
     looping: bool,
     can_rewind: bool,
+    has_page: bool,
+    overview: Option<Looking>,
+}
+
+/// The run that makes the overview of a recording.
+#[derive(Debug)]
+struct Looking {
+    overview: Arc<Overview>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Looking {
+    fn drop(&mut self) {
+        self.overview.stop();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
 }
 
 impl Serving {
@@ -102,12 +125,16 @@ impl Serving {
             None
         } else {
             let others = targets.len() - listen.len();
+            // Nobody is to come too late; but a file beside, a stream and --loop go on without anybody.
+            let is_awaited = self.page.is_some() && !brings_samples && can_rewind;
+            let is_paused =
+                self.paused || (is_awaited && others == 0 && !self.looping && speed.is_some());
             // Who connects has no need of the folder.
             let name = Path::new(source)
                 .file_name()
                 .map(|name| name.to_string_lossy());
             let name = name.as_deref().unwrap_or(source);
-            let playback = Playback::new(name, speed, self.paused);
+            let playback = Playback::new(name, speed, is_paused);
             playback.forward_only(if !can_rewind {
                 Some("the input can be read only once, so there is no way back")
             } else if others > 0 {
@@ -143,6 +170,8 @@ impl Serving {
             cast,
             looping: self.looping,
             can_rewind,
+            has_page: self.page.is_some(),
+            overview: None,
         })
     }
 }
@@ -152,6 +181,44 @@ impl Served {
     pub(super) fn audience(&self) -> Option<Arc<dyn Audience>> {
         let cast = self.cast.clone()?;
         Some(cast)
+    }
+
+    /// Looks through the whole recording of `run` beside the run itself, for a page; what it says is said by the run.
+    pub(super) fn look_through(&mut self, run: &ReplayRequest, threads: usize) {
+        let Some(cast) = self.cast.as_ref().filter(|cast| cast.is_paced()) else {
+            return;
+        };
+        if !(self.has_page && self.can_rewind) {
+            return;
+        }
+        let overview = Arc::new(Overview::default());
+        let request = ReplayRequest {
+            targets: Vec::new(),
+            audience: Some(overview.clone()),
+            speed: None,
+            copy_input: false,
+            ..run.clone()
+        };
+        cast.playback().set_overview(overview.clone());
+        let found = overview.clone();
+        let look = move || {
+            let silent = tracing::subscriber::NoSubscriber::default();
+            let run = || {
+                let pool = Pool::new(threads)?;
+                pipeline::run(&request, &pool, &mut |_| {})
+            };
+            // Why it fails the run that is played says.
+            let _ = tracing::subscriber::with_default(silent, run);
+            found.complete();
+        };
+        let thread = std::thread::Builder::new().name("strapd-overview".to_owned());
+        match thread.spawn(look) {
+            Ok(thread) => {
+                let thread = Some(thread);
+                self.overview = Some(Looking { overview, thread });
+            }
+            Err(why) => tracing::warn!("no overview of the recording: no thread: {why}"),
+        }
     }
 
     /// Runs once, and again as often as a client or `--loop` asks for it: then with `true`, to those

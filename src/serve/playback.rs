@@ -1,5 +1,6 @@
-//! A replay or a simulation that is served: its server, and who may stop and move it.
+//! A replay or a simulation that is served: its server, who may stop and move it, and the whole of it at once.
 
 pub mod controls;
 mod estimated;
+pub mod overview;
 pub mod server;

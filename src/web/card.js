@@ -21,12 +21,14 @@ export const isRecorded = (id) => /(^| )recorded$/.test(id);
 export const isReference = (id) => id === "truth" || isRecorded(id);
 
 export class Card {
-  // does: moved() draws soon; resized() at once, a canvas that changes its size is empty; anew() begins it anew;
+  // does: place() is the instant of a recording that is shown ahead of its attitudes, NaN of what is live;
+  // moved() draws soon; resized() at once, a canvas that changes its size is empty; anew() begins it anew;
   // folded() after it was folded by hand; save(kind) writes a file.
   constructor(sensor, template, view, does) {
     this.sensor = sensor;
     this.id = sensor.id;
     this.timeView = view;
+    this.place = does.place;
     this.view = { camera: new Camera(), yaw: 0 };
     this.scales = { rate: new Scale(0.2), angle: new Scale(2), error: new Scale(1e-6) };
     this.against = null;
@@ -152,30 +154,63 @@ export class Card {
       this.writeAt(now, null);
       return;
     }
-    if (!sensor.last) {
+    if (!sensor.last && !sensor.whole) {
       this.drawNothing(colours, "no data yet");
       return;
     }
     const cursor = this.timeView.cursor(sensor.clock);
-    const at = this.drawPlots(colours, cursor);
+    const plotted = this.drawPlots(colours, cursor);
     const isHeld = Number.isFinite(cursor);
-    this.held = isHeld ? { cursor, at: at && history.sample(at.number) } : null;
+    const at = isHeld ? plotted : this.ahead();
+    this.held = isHeld ? { cursor, at: at && at.track.sample(at.number) } : null;
+    this.shown = at ? at.track.sample(at.number) : null;
     if (isHeld && !at) {
       this.drawBody(colours, null);
       this.blank(`no data at ${clockTime(cursor)}`);
       return;
     }
     parts.empty.hidden = true;
+    const track = at?.track ?? history;
     const number = at?.number ?? history.total - 1;
-    const { q } = isHeld ? history.sample(number) : sensor.last;
-    this.drawBody(colours, { q, number });
+    const { q } = this.shown ?? sensor.last;
+    this.drawBody(colours, { q, number, track });
     const zeroed = aboutZ(-view.yaw / DEGREES);
-    const world = sensor.last.world ?? "start";
+    const { world } = sensor;
     const seen = product(zeroed, q);
     const heading = rollPitchYaw(seen)[2];
     drawHorizon(surfaces.horizon, colours, seen, world, heading);
     this.known.draw(surfaces.ellipse, colours, rollPitchYaw(q)[2], world);
     this.writeAt(now, heading);
+  }
+
+  // The sample of a recording where it is to be, until its attitude has come from there.
+  ahead() {
+    const { whole, last } = this.sensor;
+    if (!whole || whole.total === 0) return null;
+    const place = this.place();
+    if (last && Number.isNaN(place)) return null;
+    const number = Math.max(0, whole.firstFrom((Number.isNaN(place) ? -Infinity : place) + 1e-6) - 1);
+    return { number, track: whole };
+  }
+
+  // The instant of a recording that is shown.
+  head() {
+    const { sensor } = this;
+    if (!sensor.whole) return NaN;
+    const place = this.place();
+    return Number.isNaN(place) ? sensor.last ? sensor.history.newestTime : sensor.whole.oldestTime : place;
+  }
+
+  // Worst and rms of the error: of a recording over all of it.
+  errors() {
+    const { sensor } = this;
+    return this.isWhole() ? sensor.whole : sensor;
+  }
+
+  // Whether errors of the whole recording are those against what is chosen.
+  isWhole() {
+    const { sensor, against } = this;
+    return Boolean(sensor.whole?.compared && against && isRecorded(against.id));
   }
 
   // The numbers, no faster than they can be read.
@@ -189,21 +224,26 @@ export class Card {
 
   drawPlots(colours, cursor) {
     const { sensor, surfaces } = this;
-    const { history } = sensor;
     const span = this.span();
     const selected = this.timeView.selection(sensor.clock);
     const strokes = [colours.x, colours.y, colours.z];
-    const draw = (name, series, names, scale, options) => {
-      const lines = series.map((values, n) => {
-        return { track: history, values, colour: names.length > 1 ? strokes[n] : colours.error, name: names[n] };
+    const head = this.head();
+    const draw = (name, track, series, names, scale, options) => {
+      const of = (from) => [from?.[series]].flat();
+      const [lows, highs] = [of(track.low), of(track.high)];
+      const lines = of(track).map((values, n) => {
+        const colour = names.length > 1 ? strokes[n] : colours.error;
+        return { track, values, lows: lows[n], highs: highs[n], colour, name: names[n] };
       });
-      return drawPlot(surfaces[name], colours, lines, { span, scale, cursor, selected, ...options });
+      return drawPlot(surfaces[name], colours, lines, { span, scale, cursor, head, selected, ...options });
     };
-    const { points } = draw("rates", history.rate, ["x", "y", "z"], this.scales.rate);
-    const { at } = draw("angles", history.angle, ["roll", "pitch", "yaw"], this.scales.angle, { wraps: true });
-    if (this.against) draw("errors", [history.error], ["error"], this.scales.error);
+    const track = sensor.drawn(span);
+    const { points } = draw("rates", track, "rate", ["x", "y", "z"], this.scales.rate);
+    const { at } = draw("angles", track, "angle", ["roll", "pitch", "yaw"], this.scales.angle, { wraps: true });
+    const compared = this.isWhole() ? track : sensor.history;
+    if (this.against) draw("errors", compared, "error", ["error"], this.scales.error);
     this.plotted = { points, width: surfaces.rates.width };
-    return at;
+    return at && { ...at, track };
   }
 
   // The body and who it is compared with, at an instant; null is a neutral pose: nothing is known.
@@ -216,31 +256,35 @@ export class Card {
       scene.ends();
       return;
     }
-    const world = sensor.last.world ?? "start";
+    const { world } = sensor;
     const zeroed = aboutZ(-view.yaw / DEGREES);
     const up = upright(world);
     const toView = (v) => up(rotate(zeroed, v));
     const seen = product(zeroed, at.q);
-    const { history } = sensor;
+    const { track } = at;
     scene.world(worldNames(world));
-    const own = zLocus(history, LOCUS, toView, at.number);
-    const time = history.timeOf(at.number);
-    const reached = against?.clock === sensor.clock ? (against?.history.firstFrom(time + 1e-9) ?? 0) - 1 : (against?.history.total ?? 0) - 1;
+    const own = zLocus(track, LOCUS, toView, at.number);
+    const time = track.timeOf(at.number);
+    // Both of the whole, or both of what came.
+    const beside = track === sensor.history ? against?.history : against?.whole;
+    const reached = against?.clock === sensor.clock ? (beside?.firstFrom(time + 1e-9) ?? 0) - 1 : (beside?.total ?? 0) - 1;
     // As the error is counted.
-    const turn = sensor.turn ?? { w: 1, x: 0, y: 0, z: 0 };
-    const other = against ? zLocus(against.history, LOCUS, (v) => toView(rotate(turn, v)), reached) : [];
+    const turn = (track === sensor.history && sensor.turn) || { w: 1, x: 0, y: 0, z: 0 };
+    const other = beside ? zLocus(beside, LOCUS, (v) => toView(rotate(turn, v)), reached) : [];
+    const all = sensor.whole ? zLocus(sensor.whole, Infinity, toView, sensor.whole.total - 1) : [];
+    scene.locus(all, colours.z, false, 0.75, [], 0.15);
     scene.locus(other, colours.other, false, 1.5, [4, 4]);
     scene.locus(own, colours.z, false);
     if (other.length) {
-      const q = product(product(zeroed, turn), against.history.attitude(reached));
+      const q = product(product(zeroed, turn), beside.attitude(reached));
       scene.triad((v) => up(rotate(q, v)));
     }
     scene.body((v) => up(rotate(seen, v)));
     scene.locus(other, colours.other, true, 1.5, [4, 4]);
     scene.locus(own, colours.z, true);
-    const rate = history.sample(at.number).rate;
+    const { rate } = track.sample(at.number);
     const speed = Math.hypot(...rate);
-    const fastest = Math.max(speed, history.fastest(LOCUS, at.number));
+    const fastest = Math.max(speed, track.fastest(LOCUS, at.number));
     if (speed > 1e-4 * DEGREES) {
       scene.arrow(up(rotate(seen, rate.map((v) => (v * 0.85) / fastest))), colours.rate);
     }

@@ -32,6 +32,7 @@ export class Cards extends Map {
       return null;
     }
     const made = new Card(new Sensor(id, clocks), parts.template, view, {
+      place: this.does.place,
       moved: this.does.moved,
       resized: this.does.resized,
       anew: (where) => this.does.anew(id, where),

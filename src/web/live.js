@@ -8,6 +8,7 @@ import { demonstration, LAST } from "./demonstration.js";
 import { Fleet } from "./fleet.js";
 import { listen } from "./keys.js";
 import { Link } from "./link.js";
+import { Overview } from "./overview.js";
 import { plain, say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
 import { save } from "./save.js";
@@ -44,6 +45,7 @@ const view = new TimeView(WINDOWS.includes(chosen) ? chosen : 10, () => {
 });
 // The others are in the table alone.
 cards = new Cards({ parts, view, clocks, only }, {
+  place: () => playback.ahead,
   moved: touch,
   resized: () => draw(performance.now()),
   changed: () => {
@@ -74,6 +76,22 @@ const asking = new Asking({
   },
 });
 
+const overview = new Overview({
+  clocks,
+  token: () => link?.token,
+  of: (id) => cards.of(id)?.sensor,
+  changed: (isEmpty) => {
+    if (isEmpty) say(parts.waitingTitle, "The recording has no sample to show");
+    parts.windowField.hidden = true;
+    say(parts.liveWords, "Whole recording");
+    each((card) => {
+      card.dirty = true;
+      card.shownAt = -Infinity;
+    });
+    touch();
+  },
+});
+
 publish({
   fps: () => fps,
   frames: () => frames,
@@ -99,6 +117,7 @@ function heard(message) {
       of?.sensor.heard(message);
       if (paused || still || !of) break;
       of.sensor.take(message);
+      if (of.sensor.whole) playback.reached(of.sensor.history.newestTime);
       of.dirty = true;
       touch();
       if (frozen && stopAt !== null && message.seq >= stopAt) freeze();
@@ -137,15 +156,21 @@ function heard(message) {
 function played(message) {
   // A run that began anew: what was received before does not go with what comes.
   if (run !== message.session) {
-    if (run !== null) forget();
-    clocks.begin(message.start);
+    if (overview.isThere) each((some) => some.sensor.clear());
+    else {
+      if (run !== null) forget();
+      clocks.begin(message.start);
+    }
   }
   run = message.session;
+  if (message.overview && message.start) overview.begin(message.start);
   playback.heard(message);
   each((some) => (some.sensor.isPlayed = true));
 }
 
 function forget() {
+  overview.end();
+  each(({ sensor }) => (sensor.whole = sensor.detail = null));
   each((some) => some.clear());
   clocks.begin(null);
   view.home();
@@ -201,6 +226,7 @@ function freeze() {
 
 function draw(now) {
   clocks.update(cards.all.map((some) => some.sensor));
+  if (overview.clock) overview.look(view.span(overview.clock, 0), cards.all.map((some) => some.sensor));
   each((some) => {
     if (some.sensor.compare(some.against)) some.dirty = true;
     if (!some.surfaces || (!some.dirty && !(some.stale && now - some.shownAt > 100))) return;
@@ -271,6 +297,13 @@ function span(value) {
 }
 
 const playback = new Playback(document.querySelector("#playback"), (message) => link?.send(message));
+playback.moved = () => {
+  each((card) => {
+    card.dirty = true;
+    card.shownAt = -Infinity;
+  });
+  touch();
+};
 listen(parts, {
   pause: () => pause(!paused),
   zeroYaw,

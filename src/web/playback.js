@@ -45,19 +45,22 @@ export class Playback {
 
   gone() {
     this.state = undefined;
+    this.sought = undefined;
     this.element.hidden = true;
   }
 
   heard(state) {
     if (!state.at) return;
     this.state = state;
+    // The run has gone on from there without a word of this page's sensors.
+    if (!this.dragging && state.state === "playing" && this.place > this.sought + 1) this.sought = undefined;
     this.element.hidden = false;
     const { toggle, slider, speed, name, place } = this.parts;
     // Of a stream nobody knows the end, or the start.
     const length = this.length;
     const at = this.place;
     const playing = state.state === "playing";
-    say(toggle, playing ? "Pause" : state.state === "ended" ? "Again" : "Play");
+    say(toggle, playing ? "Pause" : state.state === "ended" ? "Replay" : "Play");
     slider.hidden = Number.isNaN(length);
     toggle.setAttribute("aria-pressed", String(playing));
     slider.max = String(length || 0);
@@ -76,12 +79,27 @@ export class Playback {
     this.send({ action: this.state.state === "playing" ? "pause" : "play" });
   }
 
+  // The place that is gone to, until an attitude has come from there; NaN if none is.
+  get ahead() {
+    return this.sought ?? NaN;
+  }
+
+  // An attitude of this time has come.
+  reached(time) {
+    if (!this.dragging && time >= this.sought - 0.01) this.sought = undefined;
+  }
+
+  seek(to) {
+    this.sought = to;
+    this.moved?.();
+    this.send({ action: "seek", at: later(this.state.start, to) });
+  }
+
   // By so many seconds.
   step(by) {
     if (!this.isThere || !this.state.start) return;
     const end = Number.isNaN(this.length) ? Infinity : this.length;
-    const to = Math.max(0, Math.min(end, this.place + by));
-    this.send({ action: "seek", at: later(this.state.start, to) });
+    this.seek(Math.max(0, Math.min(end, this.place + by)));
   }
 
   faster(by) {
@@ -95,8 +113,12 @@ export class Playback {
   drag(done) {
     this.dragging = !done;
     const now = performance.now();
+    const to = Number(this.parts.slider.value);
+    // What is known of the place is shown at once.
+    this.sought = to;
+    this.moved?.();
     if (!done && now - (this.soughtAt ?? -Infinity) < SPACING) return;
     this.soughtAt = now;
-    this.send({ action: "seek", at: later(this.state.start, Number(this.parts.slider.value)) });
+    this.seek(to);
   }
 }

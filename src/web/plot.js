@@ -30,27 +30,75 @@ function parts(lines, from, to) {
   });
 }
 
-// Least and greatest of what is drawn.
-function range(drawn) {
+// Number of the circle that an angle without jumps is in.
+const circle = (angle) => Math.floor((angle + 180) / 360);
+
+// Least and greatest of what is drawn. Of angles without jumps those within their circle; more than one are the whole.
+function range(drawn, wraps) {
   let [low, high] = [Infinity, -Infinity];
-  for (const { track, values, begin, end } of drawn) {
+  for (const { track, values, lows = values, highs = values, begin, end } of drawn) {
     for (let n = begin; n < end; n++) {
-      const value = values[track.slot(n)];
-      if (value < low) low = value;
-      if (value > high) high = value;
+      const slot = track.slot(n);
+      let [least, most] = [lows[slot], highs[slot]];
+      if (wraps && lows !== values) {
+        const turns = circle(least);
+        if (circle(most) !== turns) return [-180, 180];
+        [least, most] = [least - 360 * turns, most - 360 * turns];
+      }
+      if (least < low) low = least;
+      if (most > high) high = most;
     }
   }
   return [low, high];
 }
 
-// lines: { track, values, colour, name, dash }; `wraps` breaks a line where an angle turns over. Says how many points it
-// drew and what there is at the cursor: { number, time, values }, or null.
-export function drawPlot(surface, colours, lines, { span: [from, to], scale, wraps, cursor = NaN, selected }) {
+// Draws a line; one of an angle ends at one border of its circle and goes on at the other.
+class Pen {
+  constructor(context, yOf, wraps) {
+    Object.assign(this, { context, yOf, wraps });
+  }
+
+  moveTo(x, value) {
+    [this.x, this.value] = [x, value];
+    this.context.moveTo(x, this.yOf(this.wraps ? value - 360 * circle(value) : value));
+  }
+
+  lineTo(x, value) {
+    const { context, yOf } = this;
+    if (this.wraps) {
+      let now = circle(this.value);
+      const end = circle(value);
+      if (Math.abs(end - now) > 1) {
+        // More than a whole rotation in a column fills it.
+        context.moveTo(x, yOf(-180));
+        context.lineTo(x, yOf(180));
+        now = end;
+        context.moveTo(x, yOf(value - 360 * end));
+      }
+      if (now !== end) {
+        const up = end > now;
+        const border = 360 * Math.max(now, end) - 180;
+        const at = this.x + ((border - this.value) / (value - this.value)) * (x - this.x);
+        context.lineTo(at, yOf(up ? 180 : -180));
+        context.moveTo(at, yOf(up ? -180 : 180));
+      }
+      context.lineTo(x, yOf(value - 360 * end));
+    } else {
+      context.lineTo(x, yOf(value));
+    }
+    [this.x, this.value] = [x, value];
+  }
+}
+
+// lines: { track, values, colour, name, dash }, of stretches { lows, highs } as well; `wraps`: angles, which go around;
+// `head`: the instant that is played. Says how many points it drew and what there is at the cursor: { number, time,
+// values }, or null.
+export function drawPlot(surface, colours, lines, { span: [from, to], scale, wraps, cursor = NaN, head = NaN, selected }) {
   const context = surface.begin();
   const [width, height] = [surface.width - EDGES.left - EDGES.right, surface.height - EDGES.top - EDGES.bottom];
   if (width < 10 || height < 10) return { points: 0, at: null };
   const drawn = parts(lines, from, to);
-  const seen = range(drawn);
+  const seen = range(drawn, wraps);
   scale.follow(...seen, wraps);
   const { low, high } = scale;
   const xOf = (time) => EDGES.left + ((time - from) / (to - from)) * width;
@@ -82,14 +130,16 @@ export function drawPlot(surface, colours, lines, { span: [from, to], scale, wra
     context.setLineDash([]);
     if ((line.usual / (to - from)) * width > SPACED) mark(context, line, xOf, yOf);
   }
+  if (head >= from && head <= to) drawHead(context, colours, place, head);
   const at = cursor >= from && cursor <= to ? look(drawn, cursor, ((to - from) / width) * NEAR) : null;
   if (cursor >= from && cursor <= to) drawCursor(context, colours, place, cursor, at);
   context.restore();
   return { points, at };
 }
 
-function trace(context, { track, values, begin, end, usual }, { xOf, yOf, wraps }) {
+function trace(context, { track, values, lows, highs, begin, end, usual }, { xOf, yOf, wraps }) {
   const hole = HOLE * usual;
+  const pen = new Pen(context, yOf, wraps);
   let points = 0;
   let column = NaN;
   let [low, high, first, last] = [0, 0, 0, 0];
@@ -99,11 +149,11 @@ function trace(context, { track, values, begin, end, usual }, { xOf, yOf, wraps 
     if (Number.isNaN(column)) return;
     const rising = last >= first;
     const [one, two] = rising ? [low, high] : [high, low];
-    if (drawing) context.lineTo(column + 0.5, yOf(one));
-    else context.moveTo(column + 0.5, yOf(one));
+    if (drawing) pen.lineTo(column + 0.5, one);
+    else pen.moveTo(column + 0.5, one);
     points++;
     if (two !== one || !drawing) {
-      context.lineTo(column + 0.5, yOf(two));
+      pen.lineTo(column + 0.5, two);
       points++;
     }
     drawing = true;
@@ -111,8 +161,13 @@ function trace(context, { track, values, begin, end, usual }, { xOf, yOf, wraps 
   };
   for (let n = begin; n < end; n++) {
     const slot = track.slot(n);
-    const [value, time] = [values[slot], track.time[slot]];
-    const cut = track.broken[slot] || time - timeBefore > hole || (wraps && Math.abs(value - before) > 180);
+    const time = track.time[slot];
+    let [least, most] = lows ? [lows[slot], highs[slot]] : [values[slot], values[slot]];
+    // An angle that comes goes around by the shorter way.
+    const turns = wraps && !lows && Math.round((before - least) / 360);
+    if (turns) least = most = least + 360 * turns;
+    const value = (least + most) / 2;
+    const cut = track.broken[slot] || time - timeBefore > hole;
     if (cut || Number.isNaN(value)) {
       flush();
       drawing = false;
@@ -123,10 +178,10 @@ function trace(context, { track, values, begin, end, usual }, { xOf, yOf, wraps 
     if (at !== column) {
       flush();
       column = at;
-      [low, high, first] = [value, value, value];
+      [low, high, first] = [least, most, value];
     }
-    if (value < low) low = value;
-    if (value > high) high = value;
+    if (least < low) low = least;
+    if (most > high) high = most;
     last = value;
   }
   flush();
@@ -143,6 +198,17 @@ function mark(context, { track, values, begin, end }, xOf, yOf) {
     context.arc(x, y, 2, 0, 2 * Math.PI);
   }
   context.fill();
+}
+
+// Where the recording is that is played.
+function drawHead(context, colours, { height, xOf }, head) {
+  const x = Math.round(xOf(head)) + 0.5;
+  context.strokeStyle = colours.other;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.moveTo(x, EDGES.top);
+  context.lineTo(x, EDGES.top + height);
+  context.stroke();
 }
 
 // What each line was at the sample nearest to `time`; null where none is near.

@@ -21,8 +21,10 @@ function give(blob, name) {
 const padded = (value) => String(value).padStart(9, "0");
 
 // The samples between the ends of the plots, every digit; what is not known is empty.
+// Of a recording those that the plots are made of: of each stretch the first.
 export function rows({ sensor }, [from, to]) {
-  const { history, clock } = sensor;
+  const { clock } = sensor;
+  const history = sensor.drawn([from, to]);
   const head = "stamp_s,time_s,seq,q_w,q_x,q_y,q_z,roll_deg,pitch_deg,yaw_deg,rate_x_dps,rate_y_dps,rate_z_dps,sigma_x_deg,sigma_y_deg,sigma_z_deg,error_deg";
   const lines = [head];
   const last = history.firstFrom(to + 1e-9);
@@ -77,7 +79,7 @@ export async function savePicture(card, colours) {
 }
 
 export async function save(card, kind, colours, notice) {
-  if (!card.sensor.last) return notice(`${card.name} has no data yet: there is nothing to save`);
+  if (!card.sensor.last && !card.sensor.whole) return notice(`${card.name} has no data yet: there is nothing to save`);
   if (kind === "csv") saveRows(card);
   else await savePicture(card, colours);
   say(card.parts.saved, kind === "csv" ? "rows saved" : "picture saved");

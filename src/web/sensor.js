@@ -34,12 +34,15 @@ export class Sensor {
     this.stepsTaken = 0;
     // Who is there already when the page comes has a moment to speak.
     this.heardAt = performance.now() - 0.6 * SILENCE;
+    // Of a recording: all of it, and a part in detail.
+    this.whole = null;
+    this.detail = null;
     this.clear();
   }
 
   clear() {
     this.history.clear();
-    this.clock = null;
+    this.clock = this.whole?.clock ?? null;
     this.last = null;
     this.seen = 0;
     this.skipped = 0;
@@ -53,6 +56,7 @@ export class Sensor {
     this.history.compared = this.history.oldest;
     this.worst = NaN;
     this.error = NaN;
+    [this.squares, this.errors] = [0, 0];
     this.turn = null;
   }
 
@@ -125,9 +129,30 @@ export class Sensor {
       const error = angleBetween(product(this.turn, truth), own) * DEGREES;
       history.error[history.slot(number)] = error;
       this.error = error;
+      this.squares += error * error;
+      this.errors++;
       this.worst = Math.max(Number.isNaN(this.worst) ? 0 : this.worst, error);
     }
     return history.compared !== before;
+  }
+
+  get rms() {
+    return this.errors ? Math.sqrt(this.squares / this.errors) : NaN;
+  }
+
+  // What the plots draw between two times: of a recording all of it, as fine as it is there.
+  drawn([from, to]) {
+    const { whole, detail, history } = this;
+    if (detail && detail.covers[0] <= from && detail.covers[1] >= to) return detail;
+    return whole ?? history;
+  }
+
+  get world() {
+    return this.last?.world ?? this.whole?.world ?? "start";
+  }
+
+  get bodyAxes() {
+    return this.last?.body ?? this.whole?.body ?? "";
   }
 
   get jitter() {

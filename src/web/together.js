@@ -23,16 +23,17 @@ export class Together {
   draw(cards, view, colours) {
     if (!(this.surface.width > 0)) return;
     const scene = new Scene(this.surface, this.camera, colours);
-    const some = cards.filter(({ sensor }) => sensor.last);
-    const worlds = [...new Set(some.map(({ sensor }) => sensor.last.world ?? "start"))];
+    const some = cards.filter(({ sensor }) => sensor.last || sensor.whole);
+    const worlds = [...new Set(some.map(({ sensor }) => sensor.world))];
     scene.world(worlds.length === 1 ? worldNames(worlds[0]) : []);
     const drawn = [];
-    some.forEach(({ id, sensor }, n) => {
+    some.forEach(({ id, sensor, shown }, n) => {
       const cursor = view.cursor(sensor.clock);
       const { history } = sensor;
-      const q = Number.isFinite(cursor) ? history.attitudeAt(Math.min(cursor, history.newestTime)) : sensor.last.q;
+      const now = () => (Number.isFinite(cursor) ? history.attitudeAt(Math.min(cursor, history.newestTime)) : sensor.last?.q);
+      const q = shown?.q ?? now();
       if (!q) return;
-      const up = upright(sensor.last.world ?? "start");
+      const up = upright(sensor.world);
       const letters = [...plain(id)];
       const name = letters.length > LONGEST ? `${letters.slice(0, LONGEST - 1).join("")}…` : letters.join("");
       scene.triad((v) => up(rotate(q, v)), { width: 2, dash: DASHES[n % DASHES.length], name });

@@ -10,20 +10,31 @@ export function publish(getters) {
   window.__strapd = shown;
 }
 
+// Of a recording what is there of all of it, and what is drawn.
+function whole({ sensor, head, span }) {
+  if (!sensor.whole) return null;
+  const drawn = sensor.drawn(span);
+  return {
+    samples: sensor.whole.samples, buckets: sensor.whole.total, from: sensor.whole.oldestTime, to: sensor.whole.newestTime,
+    head, drawn: drawn.total, isDetail: drawn === sensor.detail, thinning: drawn.thinning(...span),
+  };
+}
+
 // All of it; of a card that was drawn what it shows is written there.
 export function seen(card) {
   const shown = window.__strapd;
   if (!card) return shown;
   const { sensor, id } = card;
-  if (!sensor.last) {
+  if (!sensor.last && !sensor.whole) {
     delete shown.sensors[id];
     return shown;
   }
+  const q = card.shown?.q ?? sensor.last?.q ?? { w: 1, x: 0, y: 0, z: 0 };
   shown.sensors[id] = {
-    q: sensor.last.q, rpy: rollPitchYaw(sensor.last.q), seq: sensor.last.seq, stamp: sensor.last.stamp,
-    error: sensor.error, worst: sensor.worst, tips: card.tips, centre: card.centre, scale: card.scale,
+    q, rpy: rollPitchYaw(q), seq: card.shown?.seq ?? sensor.last?.seq, stamp: sensor.last?.stamp,
+    error: sensor.error, worst: card.errors().worst, rms: card.errors().rms, whole: whole({ sensor, head: card.head(), span: card.span() }), tips: card.tips, centre: card.centre, scale: card.scale,
     camera: { ...card.view.camera }, points: sensor.history.total, dropped: sensor.dropped,
-    plotted: card.plotted, span: card.span(), held: card.held ?? null, time: sensor.history.newestTime,
+    plotted: card.plotted, span: card.span(), held: card.held ?? null, time: card.shown?.time ?? sensor.history.newestTime,
   };
   return shown;
 }

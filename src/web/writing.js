@@ -12,9 +12,10 @@ const USUAL = new Set(["ok", "provisional", "aided", "rest"]);
 const DOUBTS = 3;
 
 // Of the newest, as it came; of an instant that is looked at, what was kept of it.
-function moment({ sensor, held }) {
+function moment({ sensor, held, shown }) {
   const { last } = sensor;
   if (held) return { ...held.at, isHeld: true };
+  if (shown) return { ...shown, isHeld: true };
   const { history } = sensor;
   const newest = history.sample(history.total - 1);
   const sigma = [0, 1, 2].map((axis) => last.sigma_deg?.[axis] ?? NaN);
@@ -40,21 +41,25 @@ export function writeNumbers(card, heading) {
   say(parts.seq, whole(now.seq));
   parts.seq.value = String(now.seq);
   say(parts.stamp, clockTime(now.time, 3));
-  const flags = now.isHeld ? [] : (last.status ?? []).filter((flag) => !USUAL.has(flag));
+  const flags = now.isHeld ? [] : (last?.status ?? []).filter((flag) => !USUAL.has(flag));
   say(parts.flags, flags.join(" "));
   parts.flags.title = flags.includes("last") ? "The last there was when this page came; none since." : "";
-  say(parts.held, now.isHeld ? `at ${clockTime(now.time, 3)}` : "");
-  say(parts.frame, `${last.body} → ${last.world}`);
+  say(parts.held, card.held ? `at ${clockTime(now.time, 3)}` : "");
+  say(parts.frame, `${sensor.bodyAxes} → ${sensor.world}`);
   if (card.against) {
     show(parts.error, now.error, 6);
-    show(parts.worst, sensor.worst, 6);
+    show(parts.worst, card.errors().worst, 6);
+    show(parts.rms, card.errors().rms, 6);
   }
-  const part = sensor.thinning;
+  const [from, to] = card.span();
+  const part = sensor.whole ? sensor.drawn([from, to]).thinning(from, to) : sensor.thinning;
   const isAll = part < 1.0005;
   say(parts.thinning, isAll ? "every sample" : `1 of ${Number(part.toFixed(part < 10 ? 1 : 0))} samples`);
   parts.thinning.title = isAll
     ? "Everything the daemon made is in the plots."
-    : "The daemon thins what it sends here; peaks between those samples are not in the plots.";
+    : sensor.whole
+      ? "Each point holds the least and the greatest of so many samples; zoom in for every one."
+      : "The daemon thins what it sends here; peaks between those samples are not in the plots.";
   say(parts.dropped, sensor.dropped ? `${whole(sensor.dropped)} dropped on the way` : "");
   const spoken = angles.map((a) => fixed(a, 0));
   parts.body.setAttribute("aria-label", `Body axes of ${card.name}: roll ${spoken[0]}, pitch ${spoken[1]}, yaw ${spoken[2]} degrees`);

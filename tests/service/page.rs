@@ -17,3 +17,4 @@ mod playback;
 mod printing;
 mod saving;
 mod staying_up;
+mod whole;

@@ -3,6 +3,7 @@
 pub(in crate::serve) mod answer;
 pub(in crate::serve) mod connection;
 mod metrics;
+mod overview;
 
 use super::listen::websocket;
 use super::{page, samples, top_page};
@@ -27,6 +28,7 @@ pub(crate) fn router() -> Router {
         .route("/ws", get(upgrade))
         .route("/healthz", get(health))
         .route("/metrics", get(metrics::metrics))
+        .route("/overview", get(overview::overview))
         .route(
             "/samples",
             post(samples::post).fallback(samples::not_posted),

@@ -4,10 +4,11 @@
 //! for changes from the tasks that serve them. A seek changes no bit of any attitude: forward, the run
 //! integrates on without showing; backward, it is begun again and does not show until it is there.
 
+use super::overview::Overview;
 use crate::pipeline::pace::Pace;
 use crate::serve::guard::fault::Fault;
-use crate::serve::protocol::position::{Action, Mode, Position, Timeline};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use crate::serve::protocol::position::{Action, Mode, Part, Position, Timeline};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
 
@@ -45,6 +46,7 @@ pub struct Playback {
     state: Mutex<State>,
     changed: Condvar,
     file: String,
+    overview: OnceLock<Arc<Overview>>,
 }
 
 #[derive(Debug)]
@@ -98,7 +100,14 @@ impl Playback {
             }),
             changed: Condvar::new(),
             file: file.to_owned(),
+            overview: OnceLock::new(),
         }
+    }
+
+    /// Sets where curves of the whole are.
+    pub fn set_overview(&self, overview: Arc<Overview>) {
+        // There is one, for as long as the replay is served.
+        let _ = self.overview.set(overview);
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -288,11 +297,16 @@ impl Timeline for Playback {
             speed: state.speed,
             file: self.file.clone(),
             run: state.run,
+            has_overview: self.overview.get().is_some(),
         })
     }
 
     fn run(&self) -> u64 {
         self.state().run
+    }
+
+    fn overview(&self, part: &Part) -> Option<serde_json::Value> {
+        Some(self.overview.get()?.answer(part))
     }
 
     fn ask(&self, action: Action, stale: &mut dyn FnMut()) -> Result<(), Fault> {

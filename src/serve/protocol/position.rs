@@ -56,6 +56,19 @@ pub struct Position {
     pub file: String,
     /// Number of times it was begun anew: attitudes before and after a change do not belong together.
     pub run: u64,
+    /// Whether there is an overview of the whole.
+    pub has_overview: bool,
+}
+
+/// Part of a recording of which curves are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// First stamp; `None`: from the start.
+    pub from: Option<Nanos>,
+    /// Last stamp; `None`: to the end.
+    pub to: Option<Nanos>,
+    /// Most points of each stream.
+    pub points: usize,
 }
 
 /// A replay that is served, as the hub sees it.
@@ -72,4 +85,10 @@ pub trait Timeline: std::fmt::Debug + Send + Sync {
     /// # Errors
     /// The fault to answer with.
     fn ask(&self, action: Action, stale: &mut dyn FnMut()) -> Result<(), Fault>;
+
+    /// Curves of a part of the whole; `None`: nobody has looked at the whole.
+    fn overview(&self, part: &Part) -> Option<serde_json::Value> {
+        let _ = part;
+        None
+    }
 }

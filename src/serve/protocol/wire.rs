@@ -453,7 +453,7 @@ pub fn playback(place: &Position, session: &str) -> Bytes {
     line(&json!({
         "class": "PLAYBACK", "state": place.mode.name(), "at": stamp(place.at),
         "start": stamp(place.start), "end": stamp(place.end), "speed": place.speed,
-        "file": place.file, "session": session,
+        "file": place.file, "session": session, "overview": place.has_overview,
     }))
 }
 

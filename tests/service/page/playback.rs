@@ -163,7 +163,7 @@ fn a_recording_is_paused_sought_and_sped_up() {
     say.send(playing("ended", 60.5, 2.0)).unwrap();
     browser.until(
         "it has ended",
-        "document.querySelector('[data-testid=play]').textContent === 'Again'",
+        "document.querySelector('[data-testid=play]').textContent === 'Replay'",
     );
     browser.eval(&key("p"));
     assert_eq!(next(), json!({"class": "PLAYBACK", "action": "play"}));
@@ -203,7 +203,7 @@ fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
     browser.until_open();
     browser.until("it waits", "document.querySelector('[data-testid=play]').textContent === 'Play' && !document.querySelector('[data-testid=playback]').hidden");
     browser.eval("document.querySelector('[data-testid=play]').click()");
-    browser.until("its end", &format!("document.querySelector('[data-testid=play]').textContent === 'Again' && __strapd.seq === {}", last["seq"]));
+    browser.until("its end", &format!("document.querySelector('[data-testid=play]').textContent === 'Replay' && __strapd.seq === {}", last["seq"]));
     for name in ["w", "x", "y", "z"] {
         let shown = browser.eval(&format!("__strapd.q.{name}"));
         assert_eq!(shown, last["q"][name], "q.{name}");
@@ -292,7 +292,7 @@ fn a_recorded_orientation_is_what_a_replay_is_held_against() {
         "!document.querySelector('[data-testid=playback]').hidden",
     );
     browser.eval("document.querySelector('[data-testid=play]').click()");
-    browser.until("its end", "document.querySelector('[data-testid=play]').textContent === 'Again' && __strapd.sensors.recorded?.points === 953");
+    browser.until("its end", "document.querySelector('[data-testid=play]').textContent === 'Replay' && __strapd.sensors.recorded?.points === 953");
     let shown = browser.number("__strapd.sensors['/imu/data'].worst");
     assert!(
         (shown - worst).abs() < 1e-6,
@@ -338,7 +338,7 @@ fn a_page_of_a_simulation_shows_what_would_be_estimated() {
         browser.until("it goes", &format!("{play}.textContent === 'Pause'"));
         browser.until(
             "its end",
-            &format!("{play}.textContent === 'Again' && __strapd.sensors.imu?.seq === 600 && __strapd.sensors.truth?.seq === 600"),
+            &format!("{play}.textContent === 'Replay' && __strapd.sensors.imu?.seq === 600 && __strapd.sensors.truth?.seq === 600"),
         );
         browser.until("compared", "__strapd.sensors.imu.worst > 0");
         worst.push(browser.number("__strapd.sensors.imu.worst"));

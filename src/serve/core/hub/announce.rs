@@ -6,7 +6,7 @@ use crate::serve::guard::fault::Fault;
 use crate::serve::protocol::filter::Class;
 use crate::serve::protocol::foxglove;
 use crate::serve::protocol::foxglove::frames::{TRANSFORMS, stream_of};
-use crate::serve::protocol::position::{Action, Position};
+use crate::serve::protocol::position::{Action, Part, Position};
 use crate::serve::protocol::wire;
 use crate::sink::{Profile, Stream};
 use bytes::Bytes;
@@ -71,6 +71,12 @@ impl Hub {
     #[must_use]
     pub fn place(&self) -> Option<Bytes> {
         Some(wire::playback(&self.where_it_is()?, &self.session()))
+    }
+
+    /// Curves of a part of the whole recording that is played; `None` where there are none.
+    #[must_use]
+    pub fn overview(&self, part: &Part) -> Option<serde_json::Value> {
+        self.simulation.timeline.as_ref()?.overview(part)
     }
 
     /// The replay has begun anew, as another session.
