@@ -12,6 +12,8 @@ use super::tables::Tables;
 use super::{Global, Outcome, outputs, print};
 use crate::config::Shard;
 use crate::error::{Error, Result};
+use crate::pipeline::attitude_track::{self, Side, Track};
+use crate::pipeline::opening;
 use crate::pipeline::replay;
 use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
@@ -19,11 +21,13 @@ use crate::sink::{Compression, Encoding, Format, Options, Precision, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::setting::{BIAS, SMOOTH};
 use strapd_recording::Selection;
 use strapd_recording::Source;
+use strapd_recording::decode::Options as DecodeOptions;
 use strapd_recording::pool::Pool;
 
 /// Turn recorded gyro samples into attitude.
@@ -100,6 +104,9 @@ pub struct Replay {
     /// meaning a sample can have
     #[arg(long, value_name = "TOPIC", num_args = 0..=1, default_missing_value = "", require_equals = true, help_heading = "Estimation")]
     pub against_recorded: Option<String>,
+    /// Hold the attitude against the one in this file (.mcap, .ndjson, .csv), on the page and as --against-recorded does
+    #[arg(long, value_name = "FILE", help_heading = "Estimation")]
+    pub reference: Option<PathBuf>,
     /// Take only logs i, i+n, i+2n, ... of the list (i from 0)
     #[arg(long, value_name = "I/N", help_heading = "Output")]
     pub shard: Option<String>,
@@ -188,6 +195,10 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
                 .help("give the attitude a file name"),
         ));
     }
+    if let (Some(path), [_, _, ..]) = (&args.reference, recordings) {
+        let what = format!("--reference {} is of one log", path.display());
+        return Err(Error::usage(Diagnostic::new(what).help("give one SOURCE")));
+    }
     if recordings.len() > 1 && args.serving.page.is_some() {
         return Err(Error::usage(
             Diagnostic::new("--page: one log at a time").help("give one SOURCE"),
@@ -206,7 +217,7 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
     for log in &logs {
         let result = outputs::resolve(&args.outputs, log, recordings.len())
             .and_then(|names| {
-                let run = args.run(log, &names, (selection.clone(), plan.clone()))?;
+                let run = args.run(log, &names, (selection.clone(), plan.clone()), &pool)?;
                 outputs::make_folders(&args.outputs, &names)?;
                 Ok(run)
             })
@@ -322,6 +333,25 @@ impl Replay {
         Ok(())
     }
 
+    /// The reference from another file, if one is given: attitudes as `compare` reads them.
+    fn read_reference(&self, pool: &Pool) -> Result<Option<Arc<Track>>> {
+        let Some(path) = &self.reference else {
+            return Ok(None);
+        };
+        let input = opening::open(path)?;
+        let track = attitude_track::read(
+            &input,
+            Side::Reference,
+            None,
+            &DecodeOptions::default(),
+            pool,
+        )?;
+        for problem in &track.problems {
+            tracing::warn!("{problem}");
+        }
+        Ok(Some(Arc::new(track)))
+    }
+
     /// The run for one log.
     ///
     /// # Errors
@@ -331,6 +361,7 @@ impl Replay {
         log: &str,
         outputs: &[String],
         (selection, plan): (Selection, EstimationSettings),
+        pool: &Pool,
     ) -> Result<(ReplayRequest, Served)> {
         if self
             .out_rate
@@ -348,6 +379,7 @@ impl Replay {
             }
             _ => Source::parse(log),
         };
+        let reference = self.read_reference(pool)?;
         let can_rewind = match &source {
             Source::File(path) => path.is_file(),
             Source::Parts(_) => true,
@@ -377,7 +409,11 @@ impl Replay {
             copy_input: self.copy_input,
             out_rate: self.out_rate,
             speed: served.speed,
-            against: self.against_recorded.clone(),
+            against: match (&self.against_recorded, &reference) {
+                (None, Some(_)) => Some(String::new()),
+                (asked, _) => asked.clone(),
+            },
+            reference,
             command: super::shell::recorded_command(self.record_paths),
             record_paths: self.record_paths,
         };

@@ -249,3 +249,47 @@ fn a_run_that_writes_a_file_or_begins_again_waits_for_nobody() {
     }
     drop(process);
 }
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_reference_on_a_topic_of_its_own_or_in_a_file_is_drawn_and_its_resets_cut_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut browser = Browser::start();
+    let truth = folder.path().join("truth.csv");
+    let mut rows = "stamp_ns,qw,qx,qy,qz\n".to_owned();
+    for k in 0..2000_u64 {
+        let half = std::f64::consts::PI * k as f64 / 1000.0;
+        rows += &format!(
+            "{},{},0,0,{}\n",
+            1_000_000_000 + k * 10_000_000,
+            half.cos(),
+            half.sin()
+        );
+    }
+    std::fs::write(&truth, rows).unwrap();
+    let turning = turning(folder.path(), 2000);
+    let file = format!("--reference={}", truth.display());
+    for (log, more, most) in [
+        ("fixtures/ximu3.mcap", "--aid=gravity", 30.0),
+        // Its heading is set anew by 121 degrees at 10.6 s, which is no error.
+        ("fixtures/px4_flight.ulg", "--aid=gravity", 40.0),
+        (turning.to_str().unwrap(), file.as_str(), 2.0),
+    ] {
+        let process = Process::of(&["replay", log, "--page=127.0.0.1:0", more]);
+        browser.go(process.address(0), "/");
+        browser.until_open();
+        browser.until(
+            "a reference",
+            "__strapd.sensors.recorded?.whole?.samples > 10",
+        );
+        let own = "Object.entries(__strapd.sensors).find(([id]) => id !== 'recorded')[1]";
+        browser.until("compared", &format!("{own}.worst > 0 && {own}.rms > 0"));
+        let worst = browser.number(&format!("{own}.worst"));
+        assert!(worst < most, "{log}: {worst}");
+        browser.until(
+            "the plot",
+            "!document.querySelector('[data-part=errorBox]').hidden",
+        );
+    }
+    browser.is_unharmed();
+}

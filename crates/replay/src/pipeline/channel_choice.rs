@@ -196,16 +196,16 @@ impl Reference {
     }
 }
 
-/// The channel whose orientations the estimate is held against; `None` = the samples' own. Where each of the
-/// topics is by itself (`apart`), one of them may be the reference of the others.
+/// The channel whose orientations the estimate is held against: the one asked for, or (empty) found; `None` = the
+/// samples' own. Where each of the topics is by itself (`apart`), one of them may be the reference of the others.
 pub(super) fn reference(
     run: &ReplayRequest,
     path: &Path,
     log: &Recording,
     chosen: &[RunTopic<'_>],
-    apart: bool,
+    (asked, apart): (Option<&str>, bool),
 ) -> Result<Option<Reference>> {
-    let Some(asked) = &run.against else {
+    let Some(asked) = asked else {
         return Ok(None);
     };
     let names: BTreeSet<&str> = chosen
@@ -231,7 +231,7 @@ pub(super) fn reference(
         let Some(named) = log.channels.iter().find(|k| k.channel.topic == *asked) else {
             return Err(strapd_recording::Error::NoSuchTopic {
                 path: path.to_owned(),
-                topic: asked.clone(),
+                topic: asked.to_owned(),
                 topics: topics::listing(&log.candidates()),
             }
             .into());

@@ -3,7 +3,7 @@
 //! Of a file one walk goes as far as is needed to know clock, bias, initial attitude and lines through stamps, the next
 //! integrates. A stream is read once; its first samples wait until these are known.
 
-use super::channel_choice::{RunTopic, besides, choose, looked_at, reference, route};
+use super::channel_choice::{Reference, RunTopic, besides, choose, looked_at, reference, route};
 use super::position::Position;
 use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
@@ -106,17 +106,20 @@ fn file(
         let made_before = log.made_before().filter(|_| named.is_none());
         warnings.extend(made_before.as_ref().map(integrated_again));
     }
-    let reference = reference(run, path, &log, &chosen, false)?;
+    let reference = reference_of(run, path, &log, &chosen)?;
     let besides = besides(run, path, &log, &mut chosen)?;
     let prepared = prepare(run, &log, (&chosen, &besides), pool)?
         .into_iter()
         .collect::<Result<Vec<Prepared>>>()?;
     let starts = chosen.iter().map(|c| (c.found.clone(), c.stream.clone()));
     let mut session = begin(run, path, starts.zip(prepared))?;
-    if let (Some(reference), Some(topic)) = (&reference, session.topics.first_mut())
-        && let Some(against) = &mut topic.against
-    {
-        against.take_reference_from(&reference.resolved);
+    if let (Some(reference), Some(topic)) = (&reference, session.topics.first_mut()) {
+        if let Some(against) = &mut topic.against {
+            against.take_reference_from(&reference.resolved);
+        }
+        if let Some(recorded) = &mut topic.recorded {
+            recorded.take_reference_from(&reference.resolved);
+        }
     }
     let span = log.survey.times;
     if let Some((first, last)) = span {
@@ -142,6 +145,23 @@ fn file(
     )?;
     log_passed_over(path, &survey);
     Ok(summarise::run(run, session.finish(run, pool)?, &survey))
+}
+
+/// The reference on a topic of its own: the one asked for; for an audience the one that is found, if it can be read.
+fn reference_of(
+    run: &ReplayRequest,
+    path: &Path,
+    log: &Recording,
+    chosen: &[RunTopic<'_>],
+) -> Result<Option<Reference>> {
+    let is_shown = run.audience.as_ref().is_some_and(|a| a.wants_recorded());
+    match run.against.as_deref() {
+        _ if run.reference.is_some() => Ok(None),
+        None if is_shown => {
+            Ok(reference(run, path, log, chosen, (Some(""), false)).unwrap_or_default())
+        }
+        asked => reference(run, path, log, chosen, (asked, false)),
+    }
 }
 
 fn log_passed_over(path: &Path, survey: &Survey) {

@@ -55,7 +55,7 @@ pub(super) fn each(
         ));
     }
     let elsewhere = drawing.and_then(|d| d.reference).is_some();
-    let reference = match reference(run, path, log, &chosen, true) {
+    let reference = match reference(run, path, log, &chosen, (run.against.as_deref(), true)) {
         _ if elsewhere => None,
         Ok(reference) => reference,
         Err(refused) => {

@@ -1,5 +1,6 @@
 //! Request of a replay: from where, to where, how. Pure.
 
+use super::attitude_track::Track;
 use super::audience::Audience;
 use crate::error;
 use crate::sink::{self, Target};
@@ -34,6 +35,8 @@ pub struct ReplayRequest {
     pub audience: Option<Arc<dyn Audience>>,
     /// `--against-recorded`: the reference's topic, empty = found.
     pub against: Option<String>,
+    /// A reference from another file: it is the one of `against`, and of an audience.
+    pub reference: Option<Arc<Track>>,
     /// The command, for the output's metadata.
     pub command: String,
     /// Whether the output's metadata say in which folder the input lies.
@@ -55,6 +58,7 @@ impl ReplayRequest {
             speed: None,
             audience: None,
             against: None,
+            reference: None,
             command: String::new(),
             record_paths: false,
         }

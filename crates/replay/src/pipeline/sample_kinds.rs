@@ -417,8 +417,14 @@ impl AgainstRecorded {
             comparison.errors?;
             let mut trace = Traces::new(stretches);
             let mut last = i64::MIN;
+            let mut resets = 0;
             for_each_error(&track.entries, reference, Align::First, |at| {
                 last = last.max(x(at.stamp));
+                // No line leads across a reset of the reference.
+                let before = self.cuts.partition_point(|cut| *cut <= at.stamp);
+                if std::mem::replace(&mut resets, before) != before {
+                    trace.interrupt();
+                }
                 trace.push(
                     last,
                     [at.total, at.heading, at.inclination].map(f64::to_degrees),
@@ -436,6 +442,7 @@ impl AgainstRecorded {
             stride: self.tracks.iter().map(|t| t.stride).max().unwrap_or(1),
             usable: self.references(),
             unusable: self.unusable,
+            resets: self.cuts.iter().map(|cut| x(*cut)).collect(),
             bounds: self.bounds(stretches, &x),
             traces: MEANINGS.iter().zip(&self.tracks).filter_map(of).collect(),
         }

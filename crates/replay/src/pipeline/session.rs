@@ -317,6 +317,8 @@ impl Session {
                 topic.first_undecodable.get_or_insert(*why);
             }
             Item::Reference(raw, _) => {
+                let recorded = self.topics.iter_mut().filter_map(|t| t.recorded.as_mut());
+                recorded.for_each(|recorded| recorded.take_reference(&raw));
                 let against = self.topics.iter_mut().filter_map(|t| t.against.as_mut());
                 for against in against.filter(|a| a.is_held_against_another()) {
                     against.take_reference(&raw);

@@ -48,6 +48,9 @@ pub(super) fn topic(
 ) -> Result<(Topic, Stream)> {
     let stream = labelled(stream, &run.plan, &found.resolved, &prepared);
     let mut topic = Topic::new(path, &run.plan, found, prepared, run.against.is_some())?;
+    if let (Some(against), Some(track)) = (&mut topic.against, &run.reference) {
+        against.take_reference_track(track);
+    }
     if run.plan.smooth {
         topic.spool_beside(&run.targets);
     }
@@ -67,8 +70,12 @@ pub(super) fn begin(
     if run.audience.as_ref().is_some_and(|a| a.wants_recorded()) {
         let is_alone = streams.len() == 1;
         for (topic, stream) in topics.iter_mut().zip(&streams) {
-            let track = RecordedTrack::new(stream, is_alone, &topic.resolved, &topic.prepared);
-            topic.recorded = Some(track);
+            let mut recorded =
+                RecordedTrack::new(stream, is_alone, &topic.resolved, &topic.prepared);
+            if let Some(track) = &run.reference {
+                recorded.take_reference_track(track.clone());
+            }
+            topic.recorded = Some(recorded);
         }
     }
     let outlet = Outlet::open(

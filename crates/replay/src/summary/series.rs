@@ -93,6 +93,8 @@ pub struct Errors {
     pub usable: usize,
     /// Number of those that are no rotation.
     pub unusable: u64,
+    /// Resets of the reference by its source, ns on the axis of time.
+    pub resets: Vec<i64>,
     /// Whether the run's own sigma holds, with tilt, three sigma of it, heading (signed), three sigma of it over
     /// time, deg.
     pub bounds: Option<(Consistency, Traces<4>)>,
