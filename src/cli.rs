@@ -94,7 +94,7 @@ pub struct Global {
     /// Less on stderr: warnings and errors only; no summary
     #[arg(short, long, global = true, help_heading = "Global")]
     pub quiet: bool,
-    /// More on stderr; twice for still more
+    /// More on stderr, and the whole summary of a replay; twice for still more
     #[arg(short, long, global = true, help_heading = "Global", action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Colour on stderr

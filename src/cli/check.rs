@@ -24,6 +24,7 @@ use strapd_replay::inspection::Checked;
   strapd check flight.mcap --bias auto --gyro-range 34.9     judged as replay with these flags makes it
   strapd check flight.mcap --aid none                        the gyro alone
   strapd check 'serial:///dev/ttyUSB0?baud=115200&for=10'    ten seconds of a board on a serial port
+  strapd check flight.mcap -v                                every finding, not the ten worst of the topic that is used
   strapd check flight.mcap --json | jq '.findings[] | select(.severity != \"note\")'
 
 It judges the attitude that replay makes with the same flags, and marks what a flag deals with.
@@ -38,6 +39,10 @@ pub struct Check {
     #[command(flatten)]
     pub tables: Tables,
 }
+
+/// Findings that are printed at most, and topics that are named without a choice.
+const MOST: usize = 10;
+const FEW: usize = 3;
 
 /// Runs it.
 ///
@@ -91,7 +96,7 @@ fn one(
         });
         format!("{value}\n")
     } else {
-        text(input.name(), &checked, &found)
+        text(input.name(), &checked, &found, global.verbose > 0)
     };
     let outcome = match worst > Some(Severity::Note) {
         true => Outcome::Lossy,
@@ -108,11 +113,39 @@ fn in_json(row: &FindingRow) -> serde_json::Value {
     }
 }
 
-fn text(file: &Path, checked: &Checked, found: &[FindingRow]) -> String {
+/// Findings that are printed: those of the file and of topics that are used, the worst first, and no more than a screen
+/// holds; with `is_all` every one.
+fn printed<'f>(checked: &Checked, found: &'f [FindingRow], is_all: bool) -> Vec<&'f FindingRow> {
+    if is_all {
+        return found.iter().collect();
+    }
+    let is_used = |topic: &str| {
+        let mut of = checked.topics.iter().filter(|t| t.looked.topic == topic);
+        topic.is_empty() || of.any(|t| t.looked.is_likely)
+    };
+    let nobody_is_used = checked.topics.iter().all(|t| !t.looked.is_likely);
+    let of_used = |row: &&FindingRow| nobody_is_used || is_used(&row.finding.topic);
+    // What is open before what a flag deals with; the rest is in order already.
+    let (open, answered): (Vec<_>, Vec<_>) = found
+        .iter()
+        .filter(of_used)
+        .partition(|row| row.answered.is_none());
+    open.into_iter().chain(answered).take(MOST).collect()
+}
+
+fn text(file: &Path, checked: &Checked, found: &[FindingRow], is_all: bool) -> String {
     let mut out = String::new();
-    let topics: Vec<String> = checked
+    let shown = printed(checked, found, is_all);
+    let is_listed = |used: bool| is_all || checked.topics.len() <= FEW || used;
+    let left = checked
         .topics
         .iter()
+        .filter(|t| !is_listed(t.looked.is_likely))
+        .count();
+    let mut topics: Vec<String> = checked
+        .topics
+        .iter()
+        .filter(|t| is_listed(t.looked.is_likely))
         .map(|t| {
             format!(
                 "{} ({} samples)",
@@ -121,8 +154,11 @@ fn text(file: &Path, checked: &Checked, found: &[FindingRow]) -> String {
             )
         })
         .collect();
+    if left > 0 {
+        topics.push(format!("{left} more topics"));
+    }
     let _ = writeln!(out, "{}  {}", file.display(), topics.join(", "));
-    for row in found {
+    for row in &shown {
         let finding = &row.finding;
         let topic = if checked.topics.len() > 1 && !finding.topic.is_empty() {
             format!("{}: ", printable(&finding.topic))
@@ -147,6 +183,13 @@ fn text(file: &Path, checked: &Checked, found: &[FindingRow]) -> String {
             (advice, flags) => format!("{advice}: {flags}"),
         };
         let _ = writeln!(out, "  {:<31} -> {advice}", "");
+    }
+    if shown.len() < found.len() {
+        let left = found.len() - shown.len();
+        let _ = writeln!(
+            out,
+            "  and {left} more: -v prints all, --topic NAME those of one topic"
+        );
     }
     let count = |severity| found.iter().filter(|row| row.is_open(severity)).count();
     let _ = writeln!(

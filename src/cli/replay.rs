@@ -19,6 +19,7 @@ use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
 use crate::sink::{Compression, Encoding, Format, Options, Precision, Target};
 use clap::{Args, ValueEnum};
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -442,12 +443,30 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
         say_warnings(summary);
         return Ok(());
     }
+    let text = match global.verbose {
+        0 => format!("{}{}", summary.brief(), next(summary)),
+        _ => summary.text(),
+    };
     if global.json || writes_stdout(args) {
         // A stderr that is gone leaves nobody to tell.
-        let _ = std::io::stderr().write_all(summary.text().as_bytes());
+        let _ = std::io::stderr().write_all(text.as_bytes());
         return Ok(());
     }
-    print(&summary.text())
+    print(&text)
+}
+
+/// Line about what to do next.
+fn next(summary: &RunSummary) -> String {
+    let log = strapd_replay::shell::quoted(OsString::from(&summary.source));
+    let has_more = summary.is_lossy() || summary.topics.iter().any(|t| !t.warnings().is_empty());
+    match has_more {
+        true => format!(
+            "  next     strapd check {log}  (what is wrong and what helps; -v prints all of this summary)\n"
+        ),
+        false => format!(
+            "  next     strapd report {log} -o report.html  (pictures; -v prints all of this summary)\n"
+        ),
+    }
 }
 
 /// Prints what `--quiet` leaves: why the exit code is 3, and the warnings.

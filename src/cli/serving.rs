@@ -28,7 +28,8 @@ const PAGE: &str = "127.0.0.1:8766";
 #[command(next_help_heading = "Serving (-o tcp-listen://, unix-listen://, ws-listen://)")]
 pub struct Serving {
     /// Serve at this address as -o ws-listen:// does, at --speed 1 unless said otherwise, and stay
-    /// after the end until Ctrl-C. Without --page a run ends at its end
+    /// after the end until Ctrl-C. A replay of a file waits at its start for who plays it (not with -o or --loop).
+    /// Without --page a run ends at its end
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = PAGE, require_equals = true)]
     pub page: Option<String>,
     /// Wait at the start until a client asks to play; at --speed 1 unless said otherwise

@@ -21,7 +21,7 @@ pub use several::Several;
 
 use crate::report::calendar::date;
 use crate::report::summary::human_bytes;
-use markup::{Rows, escaped};
+use markup::{Rows, escaped, folded};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -118,15 +118,23 @@ impl Page<'_> {
             verdict.level.word(),
             escaped(&verdict.text)
         );
-        self.facts(&mut out);
-        findings::section(&self.findings, &mut out);
+        let is_any_used = self.checked.topics.iter().any(|t| t.looked.is_likely);
         for (index, topic) in self.checked.topics.iter().enumerate() {
             let drawn = stretches.filter(|_| index < DRAWN);
-            topic::section(self, topic, self.noise.get(index), drawn, &mut out);
+            let is_folded = is_any_used && !topic.looked.is_likely;
+            topic::section(
+                self,
+                topic,
+                self.noise.get(index),
+                (drawn, is_folded),
+                &mut out,
+            );
         }
         if self.checked.topics.is_empty() {
             out.push_str("<section><h2>Attitude</h2>\n<p>There is no topic of gyro samples, so there is nothing to draw.</p></section>\n");
         }
+        findings::section(&self.findings, &mut out);
+        self.facts(&mut out);
         self.made(&mut out);
         out
     }
@@ -224,7 +232,11 @@ impl Page<'_> {
         for problem in &self.checked.problems {
             rows.add("damage", problem);
         }
-        let _ = writeln!(out, "<section><h2>The log</h2>\n{}</section>", rows.html());
+        let _ = writeln!(
+            out,
+            "<section><h2>The log</h2>\n{}</section>",
+            folded("size, span, sensors", &rows.html())
+        );
     }
 
     fn made(&self, out: &mut String) {

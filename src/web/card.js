@@ -241,7 +241,9 @@ export class Card {
     const { points } = draw("rates", track, "rate", ["x", "y", "z"], this.scales.rate);
     const { at } = draw("angles", track, "angle", ["roll", "pitch", "yaw"], this.scales.angle, { wraps: true });
     const compared = this.isWhole() ? track : sensor.history;
-    if (this.against) draw("errors", compared, "error", ["error"], this.scales.error);
+    const marks = this.isWhole() ? (this.against.whole?.cuts() ?? []) : [];
+    this.marks = marks;
+    if (this.against) draw("errors", compared, "error", ["error"], this.scales.error, { marks });
     this.plotted = { points, width: surfaces.rates.width };
     return at && { ...at, track };
   }

@@ -93,7 +93,7 @@ class Pen {
 // lines: { track, values, colour, name, dash }, of stretches { lows, highs } as well; `wraps`: angles, which go around;
 // `head`: the instant that is played. Says how many points it drew and what there is at the cursor: { number, time,
 // values }, or null.
-export function drawPlot(surface, colours, lines, { span: [from, to], scale, wraps, cursor = NaN, head = NaN, selected }) {
+export function drawPlot(surface, colours, lines, { span: [from, to], scale, wraps, cursor = NaN, head = NaN, marks = [], selected }) {
   const context = surface.begin();
   const [width, height] = [surface.width - EDGES.left - EDGES.right, surface.height - EDGES.top - EDGES.bottom];
   if (width < 10 || height < 10) return { points: 0, at: null };
@@ -130,6 +130,7 @@ export function drawPlot(surface, colours, lines, { span: [from, to], scale, wra
     context.setLineDash([]);
     if ((line.usual / (to - from)) * width > SPACED) mark(context, line, xOf, yOf);
   }
+  for (const time of marks) if (time >= from && time <= to) drawMark(context, colours, place, time);
   if (head >= from && head <= to) drawHead(context, colours, place, head);
   const at = cursor >= from && cursor <= to ? look(drawn, cursor, ((to - from) / width) * NEAR) : null;
   if (cursor >= from && cursor <= to) drawCursor(context, colours, place, cursor, at);
@@ -198,6 +199,23 @@ function mark(context, { track, values, begin, end }, xOf, yOf) {
     context.arc(x, y, 2, 0, 2 * Math.PI);
   }
   context.fill();
+}
+
+// Where a reference was set anew by its source: it has another world from there on.
+function drawMark(context, colours, { height, xOf }, time) {
+  const x = Math.round(xOf(time)) + 0.5;
+  context.strokeStyle = context.fillStyle = colours.muted;
+  context.lineWidth = 1;
+  context.setLineDash([2, 3]);
+  context.beginPath();
+  context.moveTo(x, EDGES.top);
+  context.lineTo(x, EDGES.top + height);
+  context.stroke();
+  context.setLineDash([]);
+  context.font = `11px ${FONT}`;
+  context.textAlign = "left";
+  context.textBaseline = "top";
+  context.fillText("reset", x + 3, EDGES.top + 3);
 }
 
 // Where the recording is that is played.

@@ -54,6 +54,11 @@ export class Whole extends Track {
     return most;
   }
 
+  // Instants at which it begins anew.
+  cuts() {
+    return [...this.time].filter((_, n) => this.broken[n]);
+  }
+
   // Samples that one stretch stands for, on the average of a part.
   thinning(from, to) {
     const [first, last] = [this.firstFrom(from), this.firstFrom(to)];

@@ -34,7 +34,7 @@ export function seen(card) {
     q, rpy: rollPitchYaw(q), seq: card.shown?.seq ?? sensor.last?.seq, stamp: sensor.last?.stamp,
     error: sensor.error, worst: card.errors().worst, rms: card.errors().rms, whole: whole({ sensor, head: card.head(), span: card.span() }), tips: card.tips, centre: card.centre, scale: card.scale,
     camera: { ...card.view.camera }, points: sensor.history.total, dropped: sensor.dropped,
-    plotted: card.plotted, span: card.span(), held: card.held ?? null, time: card.shown?.time ?? sensor.history.newestTime,
+    plotted: card.plotted, marks: card.marks ?? [], span: card.span(), held: card.held ?? null, time: card.shown?.time ?? sensor.history.newestTime,
   };
   return shown;
 }

@@ -19,6 +19,7 @@ pub struct Ran {
 /// `strapd` in `dir` with these arguments, split at spaces, and this on its standard input.
 #[track_caller]
 pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran {
+    let whole = whole_account(arguments);
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("strapd"));
     command
         .current_dir(dir)
@@ -33,12 +34,23 @@ pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran
         // Servers here are on loopback.
         .env("NO_PROXY", "127.0.0.1")
         .args(arguments.split_whitespace());
+    if whole {
+        command.arg("-v").env("STRAPD_LOG", "info");
+    }
     let output = ended(&command, stdin);
     Ran {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
         err: String::from_utf8(output.stderr).unwrap(),
     }
+}
+
+/// Whether a test asks for all that a replay or a check has to print, and not for the few lines that fit a screen; its
+/// log stays at its level.
+fn whole_account(arguments: &str) -> bool {
+    let mut words = arguments.split_whitespace();
+    let is_long = matches!(words.next(), Some("replay" | "check"));
+    is_long && !words.any(|word| matches!(word, "-q" | "--quiet" | "-v" | "--help"))
 }
 
 #[track_caller]

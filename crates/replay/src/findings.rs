@@ -150,6 +150,9 @@ fn of_run_and_samples(topic: &CheckedTopic) -> Vec<Finding> {
         ..finding
     }));
     sensors::settle(&mut found);
+    if summary.aided.is_some() {
+        found.iter_mut().for_each(samples::follow_bias);
+    }
     found
 }
 

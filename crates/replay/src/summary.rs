@@ -29,6 +29,9 @@ use std::fmt::Write as _;
 pub use strapd_attitude::digits::significant;
 use strapd_attitude::record::SampleKind;
 
+/// Topics that are named one by one.
+const FEW: usize = 5;
+
 /// Summary of one log.
 #[derive(Clone, Debug, Default)]
 pub struct RunSummary {
@@ -70,7 +73,70 @@ impl RunSummary {
         self.topics.iter().map(|t| t.counts.total()).sum()
     }
 
-    /// Text for people.
+    /// Few lines for people, at most eight of one topic: what was done, how good it is, what to do next.
+    #[must_use]
+    pub fn brief(&self) -> String {
+        let mut out = String::new();
+        if let [topic] = self.topics.as_slice() {
+            let head = [&self.source, &topic.topic, &topic.decoded_as].map(String::as_str);
+            let _ = writeln!(out, "{}", head.join("  "));
+            for (label, text) in topic.brief(&self.file_problems) {
+                line(&mut out, label, &text);
+            }
+        } else {
+            let _ = writeln!(out, "{}  {} topics", self.source, self.topics.len());
+            for topic in self.topics.iter().take(FEW) {
+                let lines = topic.brief(&[]);
+                let of = |label| lines.iter().find(|(named, _)| *named == label);
+                let said = ["samples", "final"].map(|label| of(label).map_or("", |(_, text)| text));
+                line(
+                    &mut out,
+                    "topic",
+                    &format!("{}: {}", topic.topic, said.join("; ")),
+                );
+            }
+            if self.topics.len() > FEW {
+                line(
+                    &mut out,
+                    "",
+                    &format!("and {} more", self.topics.len() - FEW),
+                );
+            }
+        }
+        if let (Some(first), true) = (self.file_problems.first(), self.topics.len() != 1) {
+            line(&mut out, "file", first);
+        }
+        self.where_it_went(&mut out);
+        out
+    }
+
+    /// Outputs, as many lines as there are, or one if there are many.
+    fn where_it_went(&self, out: &mut String) {
+        let kept: Vec<String> = self
+            .outputs
+            .iter()
+            .filter(|(name, ..)| name != "null:")
+            .map(|(name, bytes, messages)| {
+                format!("{name}  {}  {messages} messages", human_bytes(*bytes))
+            })
+            .chain(self.calibration.clone())
+            .collect();
+        if !kept.is_empty() {
+            line(out, "wrote", &kept.join(", "));
+        }
+        if !self.served.is_empty() {
+            line(out, "served", &self.served.join(", "));
+        }
+        if self.outputs.is_empty() && self.served.is_empty() {
+            line(
+                out,
+                "wrote",
+                "nothing: add -o attitude.mcap (or .ndjson, .csv, -)",
+            );
+        }
+    }
+
+    /// Text for people, every line.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = String::new();

@@ -15,6 +15,8 @@ const BESIDE: u32 = 128;
 const FEW: usize = 60;
 /// Stretches of time in which sizes are drawn.
 const SIZES: usize = 240;
+/// Resets of a reference that are marked at most.
+const RESETS: usize = 100;
 /// Errors this many times the smallest would flatten the others.
 const FLATTENING: f64 = 6.0;
 
@@ -156,6 +158,7 @@ fn interrupt_turns(points: &mut Vec<[f64; 2]>, samples: u64) {
 pub(super) fn totals(
     traces: &[(&ErrorTrace, Traces<3>)],
     time: Time,
+    resets: &[i64],
 ) -> (Result<String, String>, Vec<&'static str>) {
     let rms = |t: &ErrorTrace| t.comparison.errors.map_or(f64::INFINITY, |e| e.total.rms);
     let least = traces
@@ -163,12 +166,13 @@ pub(super) fn totals(
         .map(|(t, _)| rms(t))
         .fold(f64::INFINITY, f64::min);
     let flattens = |t: &ErrorTrace| rms(t) > FLATTENING * least && !t.is_used && rms(t) > 0.02;
-    let lines = traces
+    let mut lines: Vec<Series> = traces
         .iter()
         .enumerate()
         .filter(|(_, (t, _))| !flattens(t))
         .map(|(color, (t, trace))| line(t.kind, color + 1, trace.points(0, time.nanos)))
         .collect();
+    lines.extend(reset_marks(&lines, time, resets));
     let left_out = traces
         .iter()
         .filter(|(t, _)| flattens(t))
@@ -177,6 +181,20 @@ pub(super) fn totals(
         over_time(time, "Error by meaning of a sample", "deg", lines),
         left_out.collect(),
     )
+}
+
+/// Upright dashed lines where the reference was reset, as high as the curves; none where it was not.
+fn reset_marks(lines: &[Series], time: Time, resets: &[i64]) -> Option<Series> {
+    let values = lines
+        .iter()
+        .flat_map(|line| line.points.iter().map(|p| p[1]));
+    let most = values.filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let upright = |at: &i64| {
+        let x = *at as f64 / time.nanos;
+        [[x, 0.0], [x, most], [f64::NAN; 2]]
+    };
+    let points: Vec<_> = resets.iter().take(RESETS).flat_map(upright).collect();
+    (!points.is_empty()).then(|| bound("reference reset", points, 0))
 }
 
 /// Heading and inclination of one meaning.

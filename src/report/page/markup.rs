@@ -86,6 +86,14 @@ pub(super) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String 
     out + "</table></div>\n"
 }
 
+/// A part that is folded until somebody opens it; on paper it is open.
+pub(super) fn folded(summary: &str, html: &str) -> String {
+    format!(
+        "<details><summary>{}</summary>\n{html}</details>\n",
+        escaped(summary)
+    )
+}
+
 /// A chart, or why there is none. Where the screen is narrow it scrolls, by keys too.
 pub(super) fn figure(id: &str, svg: Result<String, String>) -> String {
     match svg {

@@ -1,7 +1,7 @@
 //! Errors against a reference -> their part of the page. Pure.
 
 use super::charts::{self, Bounded, Time};
-use super::markup::{escaped, figure, sentence, table};
+use super::markup::{escaped, figure, folded, sentence, table};
 use crate::report::against;
 use crate::report::series::{ErrorTrace, Errors};
 use crate::report::summary::{TopicSummary, significant};
@@ -43,7 +43,10 @@ pub(super) fn section(
         out.push_str("<p>All recorded orientations are the same: the field is not filled, and this is no reference.</p>\n");
     }
     let rows: Vec<_> = errors.traces.iter().filter_map(row).collect();
-    out.push_str(&table(
+    if let Some((time, stretches)) = drawn {
+        draw(errors, time, stretches, out);
+    }
+    let numbers = table(
         "numbers",
         &[
             "a sample is",
@@ -53,12 +56,17 @@ pub(super) fn section(
             "inclination",
         ],
         &rows,
-    ));
+    );
+    out.push_str(&folded("errors by meaning of a sample", &numbers));
+    if let Some(said) = against::resets(errors.resets.len()) {
+        let _ = writeln!(
+            out,
+            "<p id=\"reference-resets\">{}.</p>",
+            escaped(&sentence(&said))
+        );
+    }
     say_left_out(errors, out);
     say_within_sigma(errors, out);
-    if let Some((time, stretches)) = drawn {
-        draw(errors, time, stretches, out);
-    }
 }
 
 /// Says whether the errors lie within the estimate's own sigma, where it has one.
@@ -153,7 +161,7 @@ fn draw(errors: &Errors, time: Time, stretches: usize, out: &mut String) {
         .iter()
         .map(|t| (t, t.trace.reduced(stretches)))
         .collect();
-    let (totals, left_out) = charts::totals(&traces, time);
+    let (totals, left_out) = charts::totals(&traces, time, &errors.resets);
     out.push_str(&figure("error", totals));
     if !left_out.is_empty() {
         let _ = writeln!(

@@ -1,7 +1,7 @@
 //! One topic -> its part of the page. Pure.
 
 use super::charts::{self, Time};
-use super::markup::{Rows, escaped, figure, table};
+use super::markup::{Rows, escaped, figure, folded, table};
 use super::{Noise, Page, numbers, reference, timeline};
 use crate::report::aid::FilterSummary;
 use crate::report::series::Drawn;
@@ -21,7 +21,7 @@ pub(super) fn section(
     page: &Page<'_>,
     topic: &CheckedTopic,
     noise: Option<&Noise>,
-    stretches: Option<usize>,
+    (stretches, is_folded): (Option<usize>, bool),
     out: &mut String,
 ) {
     let _ = writeln!(
@@ -29,6 +29,9 @@ pub(super) fn section(
         "<section class=\"topic\"><h2>{}</h2>",
         escaped(&topic.looked.topic)
     );
+    if is_folded {
+        out.push_str("<details><summary>not taken unless it is named</summary>\n");
+    }
     let is_damaged = page.checked.file_losses > 0;
     match &topic.replayed {
         Err(why) => {
@@ -43,6 +46,11 @@ pub(super) fn section(
         .ok()
         .and_then(|s| s.drawn.as_deref())
         .filter(|d| d.series.samples > 0);
+    if let Ok(summary) = &topic.replayed {
+        let errors = summary.drawn.as_deref().and_then(|d| d.errors.as_ref());
+        let drawn = drawn.zip(stretches).map(|(d, n)| (Time::of(d), n));
+        reference::section(summary, &page.reference, errors, drawn, out);
+    }
     out.push_str("<h3>Gaps, bad samples and resets</h3>\n");
     if let Ok(summary) = &topic.replayed {
         out.push_str(&facts(summary, is_damaged, |key| LOST.contains(&key)));
@@ -66,10 +74,8 @@ pub(super) fn section(
         }
         None => {}
     }
-    if let Ok(summary) = &topic.replayed {
-        let errors = summary.drawn.as_deref().and_then(|d| d.errors.as_ref());
-        let drawn = drawn.zip(stretches).map(|(d, n)| (Time::of(d), n));
-        reference::section(summary, &page.reference, errors, drawn, out);
+    if is_folded {
+        out.push_str("</details>\n");
     }
     out.push_str("</section>\n");
 }
@@ -91,29 +97,32 @@ fn facts(s: &TopicSummary, is_damaged: bool, is_wanted: impl Fn(&str) -> bool) -
 }
 
 fn integrated(s: &TopicSummary, is_damaged: bool, stretches: Option<usize>, out: &mut String) {
-    out.push_str(&facts(s, is_damaged, |key| {
-        !LOST.contains(&key) && key != AGAINST
-    }));
-    if let Some(smoothing) = s.smoothing() {
-        smoothed(smoothing, s.drawn.as_deref(), out);
-    } else if let Some(learned) = s.aided.as_ref().and_then(FilterSummary::learned) {
-        out.push_str("<h3>Calibration learned on the way</h3>\n");
-        let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
-        out.push_str(&table("numbers", &head, &learned));
-        out.push_str("<p class=\"small\">One sigma. What the motion does not show stays near nothing, with the sigma it had at first.</p>\n");
-    }
     let drawn = s.drawn.as_deref().filter(|d| d.series.samples > 0);
     match (drawn, stretches) {
         (Some(drawn), Some(stretches)) => plots(s, drawn, stretches, out),
         (Some(_), None) => out.push_str("<p>Not drawn, to keep this page small: <code>strapd report --topic NAME</code> draws it.</p>\n"),
         (None, _) => out.push_str("<p>No sample was used, so there is nothing to draw.</p>\n"),
     }
+    let facts = facts(s, is_damaged, |key| !LOST.contains(&key) && key != AGAINST);
+    out.push_str(&folded("how it was made, and how good it is", &facts));
+    if let Some(smoothing) = s.smoothing() {
+        smoothed(smoothing, s.drawn.as_deref(), out);
+    } else if let Some(learned) = s.aided.as_ref().and_then(FilterSummary::learned) {
+        out.push_str("<h3>Calibration learned on the way</h3>\n");
+        let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
+        out.push_str(&folded(
+            "bias, scale and axes",
+            &table("numbers", &head, &learned),
+        ));
+        out.push_str("<p class=\"small\">One sigma. What the motion does not show stays near nothing, with the sigma it had at first.</p>\n");
+    }
 }
 
 /// Adds what the whole recording told of the sensor, and what that is worth.
 fn smoothed(smoothing: &Smoothing, drawn: Option<&Drawn>, out: &mut String) {
     out.push_str("<h3>Calibration by the whole recording</h3>\n");
-    out.push_str(&table("numbers", &Smoothing::HEAD, &smoothing.learned()));
+    let learned = table("numbers", &Smoothing::HEAD, &smoothing.learned());
+    out.push_str(&folded("bias, scale and axes", &learned));
     out.push_str("<p class=\"small\">One sigma, after and before. What the motion does not show stays near nothing, with the sigma it had: it is not observed. Axes are small turns: xy is how far x reads y.</p>\n");
     let Some(drawn) = drawn else { return };
     for (id, chart) in charts::sizes(smoothing.sizes(), drawn) {

@@ -374,3 +374,75 @@ fn every_command_says_a_finding_in_the_same_words() {
         assert!(ran.out.contains(line), "{ran:?}");
     }
 }
+
+/// Standard output of a command as a user types it, without what tests add.
+fn typed(dir: &std::path::Path, arguments: &str) -> String {
+    let output = std::process::Command::new(assert_cmd::cargo::cargo_bin("strapd"))
+        .current_dir(dir)
+        .env_remove("STRAPD_LOG")
+        .env("STRAPD_AID", "auto")
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn what_is_printed_fits_a_screen_and_the_rest_is_there_for_who_asks() {
+    let dir = bench();
+    for name in [
+        "xsens_mti.mcap",
+        "px4_flight.ulg",
+        "faults.mcap",
+        "gopro_hero6.raw",
+    ] {
+        let log = fixture(name);
+        let replay = format!("replay {} -o out.mcap --force", log.display());
+        let brief = typed(dir.path(), &replay);
+        let lines: Vec<&str> = brief.lines().collect();
+        assert!((4..=8).contains(&lines.len()), "{name}:\n{brief}");
+        assert!(
+            lines.iter().all(|line| line.len() <= 260),
+            "{name}:\n{brief}"
+        );
+        for label in [
+            "  samples  ",
+            "  final    ",
+            "  wrote    out.mcap",
+            "  next     strapd ",
+        ] {
+            assert!(
+                brief.contains(label),
+                "{name}: `{label}` is missing:\n{brief}"
+            );
+        }
+        let whole = typed(dir.path(), &format!("{replay} -v"));
+        assert!(whole.lines().count() > lines.len(), "{name}:\n{whole}");
+        let check = typed(dir.path(), &format!("check {}", log.display()));
+        let findings = |text: &str| {
+            let kinds = ["  error ", "  warning ", "  note "];
+            text.lines()
+                .filter(|l| kinds.iter().any(|k| l.starts_with(k)))
+                .count()
+        };
+        assert!(findings(&check) <= 10, "{name}:\n{check}");
+        let all = typed(dir.path(), &format!("check {} -v", log.display()));
+        let left = findings(&all) - findings(&check);
+        assert_eq!(
+            check.contains(&format!("and {left} more")),
+            left > 0,
+            "{name}:\n{check}"
+        );
+    }
+    // Of eight topics of a flight seven are taken by nobody, and a dropout of 0 ms is none.
+    let flight = typed(
+        dir.path(),
+        &format!("check {}", fixture("px4_flight.ulg").display()),
+    );
+    assert!(
+        !flight.contains("sensor_gyro/1: ") && !flight.contains("within 0 ms"),
+        "{flight}"
+    );
+    // The filter learns the bias.
+    assert!(flight.contains("  note     bias "), "{flight}");
+}

@@ -286,6 +286,9 @@ fn a_reference_on_a_topic_of_its_own_or_in_a_file_is_drawn_and_its_resets_cut_it
         browser.until("compared", &format!("{own}.worst > 0 && {own}.rms > 0"));
         let worst = browser.number(&format!("{own}.worst"));
         assert!(worst < most, "{log}: {worst}");
+        let marks = browser.eval(&format!("{own}.marks"));
+        let resets = marks.as_array().unwrap().len();
+        assert_eq!(resets, usize::from(log.ends_with(".ulg")), "{log}: {marks}");
         browser.until(
             "the plot",
             "!document.querySelector('[data-part=errorBox]').hidden",

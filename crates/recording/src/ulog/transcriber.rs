@@ -231,8 +231,11 @@ impl Transcriber {
             b'F' => self.format(body),
             b'A' => self.subscription(body, to),
             b'O' => {
+                // One of 0 ms dropped nothing that could be measured.
                 let millis = id(body).unwrap_or(0);
-                self.fault(ProblemKind::Dropout { millis });
+                if id(body) != Some(0) {
+                    self.fault(ProblemKind::Dropout { millis });
+                }
             }
             b'B' => self.flags(body),
             b'I' => self.information(body),

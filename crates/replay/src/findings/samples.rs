@@ -278,6 +278,18 @@ fn rows(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     out.extend(found.into_iter().flatten());
 }
 
+/// Makes a note of a bias that the filter estimates: nothing is to be done about it.
+pub(super) fn follow_bias(found: &mut Finding) {
+    if found.code == BIAS_CODE {
+        found.severity = Severity::Note;
+        found.advice =
+            "the filter estimates it; with the gyro alone it has to be removed".to_owned();
+    }
+}
+
+/// Code of the finding of a bias at rest.
+const BIAS_CODE: &str = "bias";
+
 /// A bias at rest.
 fn bias(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let Some(found) = &seen.looked.bias else {
@@ -291,7 +303,7 @@ fn bias(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         out.push(
             Finding::new(
                 Severity::Warning,
-                "bias",
+                BIAS_CODE,
                 format!(
                     "at rest the gyro reads {} deg/h (+- {}): so fast the attitude drifts",
                     significant(size, 3),

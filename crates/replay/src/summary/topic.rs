@@ -3,6 +3,8 @@
 //! A figure of an estimator stands in this file alone: a field, what it is taken from, and its row, of which text,
 //! JSON, page and Python are made.
 
+mod brief;
+
 use super::against::{Against, Recorded, against_text};
 use super::aid::FilterSummary;
 use super::clocks::{clock_set_row, clock_was_set, wraps_row};
