@@ -24,6 +24,8 @@ mod joined;
 mod joined_formats;
 mod layouts;
 mod model;
+#[cfg(unix)]
+mod next;
 mod packed;
 #[cfg(unix)]
 mod pages;

@@ -61,21 +61,16 @@ impl Overview<'_> {
         said
     }
 
-    /// The command to run next, with the flags this log needs.
+    /// The command to run next, with the flags this log needs; `None`: none that runs as it stands.
     #[must_use]
-    pub fn next(&self) -> String {
+    pub fn next(&self) -> Option<String> {
         let file = typed(self.input.source());
         if let Some(made) = &self.made_before {
-            let of = made.of.as_ref().map(|of| quoted_file(Path::new(of)));
-            let of = of.unwrap_or_else(|| "RECORDING".to_owned());
-            return format!("strapd compare {file} {of}   # {made}");
+            let of = quoted_file(Path::new(made.of.as_ref()?));
+            return Some(format!("strapd compare {file} {of}   # {made}"));
         }
         let best = match self.looked {
-            [] => {
-                return format!(
-                    "strapd replay {file} {TOPIC} NAME {FIELD} gyro=PATH   # no IMU topic here; this names a rate in any message"
-                );
-            }
+            [] => return None,
             [one] => one,
             several => {
                 let mut ranks = BTreeMap::new();
@@ -90,10 +85,10 @@ impl Overview<'_> {
                 match (likely.next(), likely.next()) {
                     (Some(one), None) => one,
                     (first, _) => {
-                        return format!(
+                        return Some(format!(
                             "strapd replay {file} {} -o attitude.mcap   # or another topic, or all",
                             flag(&TOPIC.to_string(), first.map_or("", |l| l.topic.as_str()))
-                        );
+                        ));
                     }
                 }
             }
@@ -116,7 +111,18 @@ impl Overview<'_> {
             help.push(AGAINST_RECORDED.into());
         }
         let help: String = help.iter().map(|choice| format!(" {choice}")).collect();
-        format!("strapd replay {file} -o attitude.mcap{help}")
+        Some(format!("strapd replay {file} -o attitude.mcap{help}"))
+    }
+
+    /// Reason for which there is no command to run next.
+    #[must_use]
+    pub fn why_no_next(&self) -> String {
+        match &self.made_before {
+            Some(made) => format!("{made}: look at the recording it was made of"),
+            None => format!(
+                "no topic carries a rate: {TOPIC} NAME {FIELD} gyro=PATH takes it from any message"
+            ),
+        }
     }
 
     /// JSON for machines: one object.

@@ -27,7 +27,10 @@ pub(super) fn text(info: &Overview<'_>) -> String {
     for problem in &info.problems {
         let _ = writeln!(out, "problem   {problem}");
     }
-    let _ = writeln!(out, "next      {}", info.next());
+    let _ = match info.next() {
+        Some(command) => writeln!(out, "next      {command}"),
+        None => writeln!(out, "no attitude: {}", info.why_no_next()),
+    };
     out
 }
 
