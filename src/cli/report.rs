@@ -91,6 +91,18 @@ pub fn run(global: &Global, mut args: Report) -> Result<Outcome> {
         }
         _ => {}
     }
+    let ending = output
+        .and_then(Path::extension)
+        .map(|ending| ending.to_ascii_lowercase());
+    if let (Some(path), Some(ending)) = (output, ending)
+        && ["pdf", "png", "svg", "jpg", "docx", "md"]
+            .iter()
+            .any(|other| ending == *other)
+    {
+        let what = format!("-o {}: a report is HTML", path.display());
+        let help = "-o report.html; a browser prints it, as PDF too";
+        return Err(Error::usage(Diagnostic::new(what).help(help)));
+    }
     if let (Some(path), [_, _, ..]) = (&args.reference, args.files.as_slice()) {
         let what = format!("--reference {} is of one log", path.display());
         return Err(Error::usage(Diagnostic::new(what).help(

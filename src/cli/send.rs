@@ -214,6 +214,21 @@ fn read(
     Ok(Read { topic, lost })
 }
 
+/// Failure with what helps, where that is known.
+fn with_help(what: String, has_token: bool) -> Diagnostic {
+    let says = |words: &[&str]| words.iter().any(|word| what.contains(word));
+    let help = if says(&["Connection refused", "connection refused", "No such file"]) {
+        "is `strapd serve` running there? ADDRESS names where it listens"
+    } else if says(&["unauthorised", "bad_auth", "401"]) && !has_token {
+        "--token-file FILE shows the daemon's token (or STRAPD_TOKEN_FILE)"
+    } else if says(&["unauthorised", "bad_auth", "401"]) {
+        "--token-file: the first line of FILE is to be the daemon's token"
+    } else {
+        return what.into();
+    };
+    Diagnostic::from(what).help(help)
+}
+
 /// Account of what was sent.
 #[derive(Debug, Default)]
 struct Sent {
@@ -234,7 +249,7 @@ async fn send(
 ) -> Result<Sent> {
     let failed = |what: String| Error::Remote {
         address: remote.to_string().into(),
-        what: what.into(),
+        what: with_help(what, token.is_some()),
     };
     let mut sender = Sender::connect(remote, token).await.map_err(failed)?;
     let (mut sent, mut chunk) = (Sent::default(), String::new());

@@ -6,6 +6,7 @@
 )]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod advice;
 mod allan;
 mod bad_input;
 mod calibration;

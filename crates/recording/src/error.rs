@@ -6,7 +6,7 @@ use crate::recognise::Foreign;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::setting::{FIELD, TOPIC};
+use strapd_attitude::setting::{COLUMNS, FIELD, TOPIC};
 
 /// A log that could not be read.
 #[derive(Debug)]
@@ -198,7 +198,8 @@ impl From<&Error> for Diagnostic {
             Error::NotMcap { path, found } => Diagnostic::new(format!(
                 "{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n",
                 path.display()
-            )),
+            ))
+            .help(format!("no other format that is read begins so, either; of a table the first line names the columns, or {COLUMNS} does")),
             Error::NotTable { path, why } => why.clone().at(format_args!(
                 "{}: no table that can be read",
                 path.display()

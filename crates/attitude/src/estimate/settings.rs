@@ -223,8 +223,7 @@ impl Takes {
             Takes::Count(_) => "a number of samples".to_owned(),
             Takes::Rate(_) => "3 numbers x,y,z in rad/s".to_owned(),
             Takes::Factors(_) => "a factor above 0, or 3 of them x,y,z".to_owned(),
-            Takes::Mounting(_) => "4 numbers q=w,x,y,z".to_owned(),
-            Takes::Attitude(_) => {
+            Takes::Mounting(_) | Takes::Attitude(_) => {
                 "4 numbers q=w,x,y,z, or 3 numbers rpy=roll,pitch,yaw in degrees".to_owned()
             }
             Takes::Text { what, .. } => (*what).to_owned(),
@@ -283,7 +282,10 @@ impl Row {
             Takes::Count(set) => set(plan, text.parse().map_err(|_| wrong())?),
             Takes::Rate(set) => set(plan, read::numbers(&text).ok_or_else(wrong)?),
             Takes::Factors(set) => set(plan, read::factors(&text).ok_or_else(wrong)?),
-            Takes::Mounting(set) => set(plan, self.quaternion(&text)?),
+            Takes::Mounting(set) => match read::roll_pitch_yaw(&text) {
+                Some(q_bs) => set(plan, q_bs),
+                None => set(plan, self.quaternion(&text)?),
+            },
             Takes::Attitude(set) => match read::roll_pitch_yaw(&text) {
                 Some(q_nb) => set(plan, q_nb),
                 None => set(plan, self.quaternion(&text)?),

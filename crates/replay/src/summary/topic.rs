@@ -26,7 +26,9 @@ use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, SampleKind, Verdict};
-use strapd_attitude::setting::{ACCEL_AXES, ACCEL_SCALE, AID, GYRO_AXES, GYRO_SCALE, MAG_AXES};
+use strapd_attitude::setting::{
+    ACCEL_AXES, ACCEL_SCALE, AID, GYRO_AXES, GYRO_SCALE, MAG_AXES, MAG_MOUNT, MOUNT,
+};
 use strapd_attitude::worlds::EARTH_RATE;
 
 /// Summary of one topic: of a log, or of samples that still come.
@@ -505,7 +507,14 @@ fn sensor_maps(plan: &EstimationSettings) -> Option<String> {
         true => format!("{setting} {x}"),
         false => format!("{setting} {x},{y},{z}"),
     });
-    let all: Vec<String> = maps.chain(scales).collect();
+    let mounts = [(MOUNT, plan.mount), (MAG_MOUNT, plan.mag_mount)];
+    let mounts = mounts.iter().filter_map(|(setting, mount)| {
+        let angles = mount.as_ref()?.yaw_pitch_roll();
+        let [roll, pitch, yaw] =
+            [angles.roll, angles.pitch, angles.yaw].map(|angle| significant(angle.to_degrees(), 4));
+        Some(format!("{setting} rpy={roll},{pitch},{yaw}"))
+    });
+    let all: Vec<String> = maps.chain(scales).chain(mounts).collect();
     (!all.is_empty()).then(|| all.join(", "))
 }
 

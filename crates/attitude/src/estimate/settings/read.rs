@@ -3,7 +3,6 @@
 use crate::diagnostic::Diagnostic;
 use crate::estimate::noise_figures::NOISE_FIGURES;
 use crate::estimate::plan::Noise;
-use crate::frames::{Body, Nav};
 use crate::quaternion::{Quaternion, YawPitchRoll};
 use crate::setting::Setting;
 use std::fmt::Display;
@@ -45,8 +44,8 @@ pub(super) fn unit<To, From>(
     Ok(Quaternion::assume_unit(q.map(|v| v / norm)))
 }
 
-/// Attitude of `rpy=roll,pitch,yaw` in degrees.
-pub(super) fn roll_pitch_yaw(text: &str) -> Option<Quaternion<Nav, Body>> {
+/// Rotation of `rpy=roll,pitch,yaw` in degrees: attitude of the second frame in the first.
+pub(super) fn roll_pitch_yaw<To, From>(text: &str) -> Option<Quaternion<To, From>> {
     let [roll, pitch, yaw] = numbers(text.strip_prefix("rpy=")?)?.map(f64::to_radians);
     let angles = YawPitchRoll { yaw, pitch, roll };
     Some(Quaternion::from_yaw_pitch_roll(&angles))

@@ -359,7 +359,7 @@ pub static ROWS: [Row; 36] = [
     },
     Row {
         setting: MOUNT,
-        meaning: "Rotation from sensor to body axes, C_bs, as a quaternion: q=w,x,y,z",
+        meaning: "Rotation from sensor to body axes, C_bs: q=w,x,y,z, or rpy=roll,pitch,yaw of the sensor in body axes, in degrees",
         default: Default::Unset("none"),
         placeholder: "q=W,X,Y,Z",
         takes: Takes::Mounting(|p, q_bs| p.mount = Some(q_bs)),

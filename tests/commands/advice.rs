@@ -1,0 +1,56 @@
+//! Promise: where something fails the message says what helps, and a mounting is said in angles as well as in numbers.
+
+use crate::program::strapd;
+use crate::replays::fixture;
+
+#[test]
+fn a_mounting_in_angles_is_that_of_its_quaternion_and_is_in_the_summary() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = fixture("constant_rate.mcap").display().to_string();
+    let run = |mount: &str, out: &str| {
+        let ran = strapd(
+            dir.path(),
+            &format!("replay {log} --mount {mount} -o {out}"),
+        );
+        assert!(
+            ran.done().out.contains("--mount rpy=0,0,90.00"),
+            "{}",
+            ran.out
+        );
+        std::fs::read_to_string(dir.path().join(out)).unwrap()
+    };
+    let half = std::f64::consts::FRAC_PI_4;
+    let angles = run("rpy=0,0,90", "a.csv");
+    let numbers = run(&format!("q={},0,0,{}", half.cos(), half.sin()), "b.csv");
+    let last = |text: &str| -> Vec<f64> {
+        let row = text.lines().last().unwrap().to_owned();
+        row.split(',')
+            .filter_map(|cell| cell.parse().ok())
+            .collect()
+    };
+    let (angles, numbers) = (last(&angles), last(&numbers));
+    assert!(angles.len() == numbers.len() && angles.len() > 5);
+    for (a, b) in angles.iter().zip(&numbers) {
+        assert!((a - b).abs() <= 1e-12 * b.abs().max(1.0), "{a} {b}");
+    }
+}
+
+#[test]
+fn what_fails_says_what_helps() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let log = fixture("constant_rate.mcap").display().to_string();
+    // A port that nobody has: it was free a moment ago.
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = free.local_addr().unwrap();
+    drop(free);
+    strapd(at, &format!("send {log} tcp://{address}"))
+        .refused(1, &["refused", "is `strapd serve` running there?"]);
+    strapd(at, &format!("report {log} -o x.pdf"))
+        .refused(2, &["a report is HTML", "-o report.html"]);
+    std::fs::write(at.join("a.txt"), "1700000000 0.1 0.2 0.3\n").unwrap();
+    strapd(at, "info a.txt").refused(
+        1,
+        &["a.txt", "the first line names the columns, or --columns"],
+    );
+}
