@@ -238,11 +238,14 @@ fn a_clock_that_was_set_is_told_by_how_much_and_where() {
         ),
     ] {
         std::fs::write(dir.path().join(name), table(&shifted(by))).unwrap();
-        let check = strapd(dir.path(), &format!("check {name}"));
+        let check = strapd(dir.path(), &format!("check {name} --sample-kind rate"));
         assert_eq!(check.code, Some(3));
         assert!(check.out.contains(told), "{check:?}");
         assert!(!check.out.contains("are missing"), "{check:?}");
-        let replay = strapd(dir.path(), &format!("replay {name} -o null:"));
+        let replay = strapd(
+            dir.path(),
+            &format!("replay {name} -o null: --sample-kind rate"),
+        );
         assert!(!replay.out.contains("; -"), "{replay:?}");
         if by < 0 {
             assert!(replay.out.contains("19.980 s at 100.00 Hz"), "{replay:?}");

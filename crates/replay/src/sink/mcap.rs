@@ -246,7 +246,7 @@ impl Declared {
                 own.rate = declare(
                     &format!("{}/rate", stream.output_topic),
                     VECTOR_SCHEMA,
-                    None,
+                    Some(SampleKind::Rate),
                 )?;
             }
         }
