@@ -9,6 +9,7 @@
 
 mod arrival;
 pub(super) mod attitude_now;
+mod doubting;
 pub(super) mod doubts;
 mod intervals;
 mod losing;

@@ -68,7 +68,7 @@ fn lines(id: &str, samples: &[Sample], from: usize) -> String {
         .collect()
 }
 
-/// What is done to the samples, and the finding that it raises, with what its settings hold.
+/// Name, change of the samples, the finding that it raises, and a part of its settings.
 type Fault = (
     &'static str,
     fn(usize, &mut Sample),

@@ -25,7 +25,7 @@ const LASTING: [&str; 9] = [
     "field-frozen",
     "field-empty",
 ];
-/// Those of them that are about gyro and gravity.
+/// Codes of those about gyro and gravity.
 const OF_GYRO: [&str; 3] = ["gyro-axes", "gyro-scale", "gyro-against-gravity"];
 /// Segments with a field after which it is judged after every fourth alone.
 const OFTEN: usize = 24;
@@ -114,7 +114,7 @@ fn is_a_clock(found: &ClockSpeed) -> bool {
 pub struct LiveFindings {
     /// Everything there is to report, the worst first.
     pub now: Vec<Finding>,
-    /// What stays true of the sensor, though its samples say nothing of it for a while.
+    /// Findings that stay true of the sensor, though its samples say nothing of them for a while.
     pub lasting: Vec<Finding>,
     /// Whether gyro and gravity agreed for so long that what was reported of them before is over.
     pub is_gyro_sound: bool,

@@ -3,8 +3,7 @@
 //! Apart from the stream because nothing of the attitude depends on it. What is certain of a sensor stays so: through a
 //! `RESET`, a new run and a restart, until its settings are others, or a minute of motion shows nothing of it.
 
-use super::SensorStream;
-use crate::report::findings::{Finding, SensorWatch, Severity, is_of_gyro, of_sensor, says};
+use crate::report::findings::{Finding, SensorWatch, Severity, is_of_gyro, says};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,30 +15,6 @@ const PACE: i64 = 2_000_000_000;
 /// Most findings that are kept of a sensor, and the longest as text: what a state file holds may be anything.
 const MOST: usize = 32;
 const LONGEST: usize = 4096;
-
-impl SensorStream {
-    /// Judges the samples so far, and returns lines for the log, each once. `plan` is that of [`SensorStream::new`].
-    pub fn doubted(&mut self, plan: &EstimationSettings) -> Vec<String> {
-        let last = self.conditioning().last;
-        let (Some(doubts), Some(last)) = (&mut self.doubts, last) else {
-            return Vec::new();
-        };
-        doubts.judge(last, &self.estimator, plan);
-        doubts.news()
-    }
-
-    /// Findings as `STATUS` has them, the worst first.
-    #[must_use]
-    pub fn findings(&self) -> Vec<serde_json::Value> {
-        let (report, clock) = (self.conditioning(), self.prepared.clock.name());
-        let mut found = of_sensor(report, &self.estimator.propagation(), clock);
-        found.extend(self.stamp_unit.finding());
-        let mut found: Vec<_> = found.iter().map(Finding::json).collect();
-        found.extend(self.doubts.iter().flat_map(|doubts| doubts.findings()));
-        found.sort_by_key(rank);
-        found
-    }
-}
 
 /// Findings that outlive a daemon.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
@@ -159,7 +134,7 @@ impl Doubts {
         self.now.iter().map(Finding::json).chain(lasting).collect()
     }
 
-    /// What a daemon after this one is to know.
+    /// Findings that a daemon after this one is to know.
     pub(super) fn lasting(&self) -> Option<Lasting> {
         (!self.lasting.found.is_empty()).then(|| self.lasting.clone())
     }
@@ -178,7 +153,7 @@ fn text<'a>(finding: &'a Value, key: &str) -> &'a str {
 }
 
 /// Place of a severity, the worst first.
-fn rank(finding: &Value) -> usize {
+pub(super) fn rank(finding: &Value) -> usize {
     let name = text(finding, "severity");
     let worst_first = [Severity::Error, Severity::Warning, Severity::Note];
     let place = worst_first
