@@ -3,7 +3,7 @@
 //! Apart from what is found because that is saved, too, and knows no stream.
 
 use super::SensorStream;
-use super::doubts::{Doubts, rank};
+use super::doubts::rank;
 use crate::report::findings::{Finding, of_sensor};
 use strapd_attitude::estimate::EstimationSettings;
 
