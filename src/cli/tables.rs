@@ -9,7 +9,7 @@ use strapd_recording::decode::Options;
 #[derive(Args, Debug, Clone, Default)]
 #[command(next_help_heading = "Tables of text")]
 pub struct Tables {
-    /// Columns of a table, by name or number from 1: ROLE=NAME:NAME:NAME[:UNIT],ROLE=...
+    /// Columns of a table, by name or number from 1: ROLE=NAME:NAME:NAME[:UNIT[*FACTOR]],ROLE=...
     ///
     /// ROLE is one of gyro, accel, mag (x:y:z), orientation (w:x:y:z), stamp, counter. `info` and the summary print
     /// what they assumed. Roles that are not given are found by name; =none leaves one out.
