@@ -44,7 +44,7 @@ pub use aiding::{Aiding, Forces};
 pub use anew::RestartRequest;
 pub use calibrated::learned;
 pub use clock_pass::{ClockPass, ClockVerdict, batches_message, speed_message};
-pub use estimator::{Estimator, Memory};
+pub use estimator::Estimator;
 pub use first_pass::{Conditioned, FEW};
 pub use intervals::{LEAST_INTERVALS, Mismatch};
 pub use kept::{Spool, SpoolError};

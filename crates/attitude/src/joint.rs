@@ -33,7 +33,7 @@ pub enum RelativeHeading {
     Auto,
     /// The hinge.
     Hinge,
-    /// As recorded: both sensors know north, or share a reference.
+    /// Headings as recorded: both sensors know north, or share a reference.
     Recorded,
     /// Equal headings at the first common instant: a calibration pose, correct as long as neither sensor drifts.
     Start,

@@ -247,7 +247,6 @@ fn inspection(resolved: &Meaning, prepared: &Prepared) -> Inspection {
         described: PayloadType::default(),
         frame: String::new(),
         resolved: resolved.clone(),
-        kind_stated: true,
         quality: Default::default(),
         quality_unit: GyroUnit::Rad,
         rests: Default::default(),
