@@ -457,6 +457,10 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
 
 /// Line about what to do next.
 fn next(summary: &RunSummary) -> String {
+    if Path::new(&summary.source) == Source::Stdin.name() {
+        // It is gone: there is nothing that a command could read again.
+        return "  next     -v prints all of this summary\n".to_owned();
+    }
     let log = strapd_replay::shell::quoted(OsString::from(&summary.source));
     let has_more = summary.is_lossy() || summary.topics.iter().any(|t| !t.warnings().is_empty());
     match has_more {

@@ -144,8 +144,13 @@ fn what_a_line_says_of_units_and_meaning_holds_and_what_it_can_not_mean_is_count
         ran.done().json()["topics"][0].clone()
     };
     for (of, z, kind) in [
-        ("", 0.5, "rate"),
-        (",\"gyro_unit\":\"deg\"", 0.5_f64.to_degrees(), "rate"),
+        // Nothing states it: by the step of 10 ms.
+        ("", 0.5, "average"),
+        (
+            ",\"gyro_unit\":\"deg\",\"sample_kind\":\"rate\"",
+            0.5_f64.to_degrees(),
+            "rate",
+        ),
         (
             ",\"gyro_unit\":\"mrad\",\"sample_kind\":\"average\"",
             500.0,

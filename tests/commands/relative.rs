@@ -85,8 +85,10 @@ fn the_angle_of_a_knee_is_found_without_a_common_heading() {
         let number = |k: usize| row[k].parse::<f64>().unwrap();
         let truth = leg(number(0) * 1e-9, 0.0).0.to_degrees();
         let error = sign * number(1) - (truth - *first.get_or_insert(truth));
+        // The tilt is known after a while.
+        let is_early = number(0) < 10e9;
         assert!(
-            number(3) > 0.0 && number(3) < 5.0,
+            number(3) > 0.0 && (is_early || number(3) < 5.0),
             "sigma {} deg",
             number(3)
         );

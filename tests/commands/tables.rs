@@ -202,8 +202,13 @@ fn each_dialect_gives_the_attitude_of_an_mcap_of_the_same_samples_to_the_bit() {
     for made in made() {
         written(at, "same.mcap", &made.samples);
         std::fs::write(at.join(made.name), &made.text).unwrap();
-        let run =
-            |arguments: &str, stdin| attitudes(at, &format!("{arguments} {}", made.flags), stdin);
+        let run = |arguments: &str, stdin| {
+            attitudes(
+                at,
+                &format!("{arguments} --sample-kind rate {}", made.flags),
+                stdin,
+            )
+        };
         let (expected, stamps, _) = run("same.mcap", Vec::new());
         let (rows, own, said) = run(made.name, Vec::new());
         assert_eq!((rows.len(), &own), (800, &stamps), "{}", made.name);
@@ -218,11 +223,13 @@ fn each_dialect_gives_the_attitude_of_an_mcap_of_the_same_samples_to_the_bit() {
             .unwrap();
         let columns: String = flag.replace(' ', "\u{1}");
         for (name, stdin) in [(made.name, String::new()), ("-", made.text.clone())] {
-            let mut arguments: Vec<String> =
-                format!("replay {name} {} -o out.csv --force --columns", made.flags)
-                    .split(' ')
-                    .map(str::to_owned)
-                    .collect();
+            let mut arguments: Vec<String> = format!(
+                "replay {name} --sample-kind rate {} -o out.csv --force --columns",
+                made.flags
+            )
+            .split(' ')
+            .map(str::to_owned)
+            .collect();
             arguments.push(columns.replace('\u{1}', " "));
             let ran = assert_cmd::Command::cargo_bin("strapd")
                 .unwrap()
@@ -279,17 +286,22 @@ fn every_command_takes_a_table() {
     strapd(at, "report t.tsv -o r.html").done();
     strapd(at, "allan t.tsv").done();
     // What is cut from it is it, in SI and under strapd's own names.
-    let (expected, ..) = attitudes(at, "m.mcap --aid gravity", Vec::new());
+    let (expected, ..) = attitudes(at, "m.mcap --aid gravity --sample-kind rate", Vec::new());
     for format in ["csv", "ndjson"] {
         let cat = strapd(at, &format!("cat t.tsv --format {format}"));
-        let (rows, ..) = attitudes(at, "- --aid gravity", cat.done().out.clone().into_bytes());
+        let (rows, ..) = attitudes(
+            at,
+            "- --aid gravity --sample-kind rate",
+            cat.done().out.clone().into_bytes(),
+        );
         assert!(rows == expected, "by cat --format {format}");
     }
     let (cut, table) = (
         strapd(at, "cat m.mcap --format csv"),
         strapd(at, "cat t.tsv --format csv"),
     );
-    assert_eq!(cut.done().out, table.done().out);
+    // The log states what its samples mean.
+    assert_eq!(cut.done().out.replace(",rate\n", ",\n"), table.done().out);
 }
 
 #[test]

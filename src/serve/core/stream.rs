@@ -420,9 +420,6 @@ impl SensorStream {
             return;
         };
         self.first = saved.span().first;
-        if let Some(choice) = saved.memory().and_then(Memory::sample_kind) {
-            self.estimator.keep_kind(choice);
-        }
         let step = stamp.map(|stamp| stamp.since(saved.span().last));
         let is_near = step.is_some_and(|step| plan.bridges(step));
         let resumed = match saved.memory().filter(|_| is_near) {
@@ -456,9 +453,6 @@ impl SensorStream {
         prepared.has_arrival = plan.stamps == StampRepair::Auto;
         prepared.batches = self.conditioning().batches;
         let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
-        if self.estimator.is_kind_decided() {
-            estimator.keep_kind(self.estimator.sample_kind());
-        }
         let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
         if labels.world_axes != self.channel.stream().world_axes {
             return Err(fault(format!(

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use strapd::pipeline::replay::run;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::EstimationSettings;
+use strapd_attitude::record::SampleKind;
 use strapd_recording::pool::Pool;
 
 /// Stamps off even ones by up to 3 % of the step, as a lattice.
@@ -23,6 +24,8 @@ fn jittered(n: usize) -> Vec<ImuSample> {
 fn regularised() -> EstimationSettings {
     EstimationSettings {
         regularise_stamps: true,
+        // The log says so, and lines do not.
+        kind: Some(SampleKind::Rate),
         ..EstimationSettings::default()
     }
 }
@@ -118,7 +121,7 @@ fn a_pipe_is_filtered_as_it_comes_and_says_that_its_numbers_differ() {
         ),
     ] {
         let out = assert_cmd::Command::new(env!("CARGO_BIN_EXE_strapd"))
-            .args(["replay", "-", "--regularise-stamps", "-o", "null:"])
+            .args(["replay", "-", "--regularise-stamps", "-v", "-o", "null:"])
             .write_stdin(input)
             .assert()
             .success();

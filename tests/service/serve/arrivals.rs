@@ -2,7 +2,7 @@
 //! lie evenly, however they are bundled.
 
 use super::client::Client;
-use super::daemon::{Daemon, TCP, listening};
+use super::daemon::{Daemon, TCP, eventually, listening};
 use serde_json::Value;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -129,9 +129,10 @@ fn without_the_setting_they_are_refused_with_its_name() {
             .contains("?stamp=arrival"),
         "{error}"
     );
-    let status = daemon.status();
-    assert_eq!(status["sources"][0]["attitudes"], 0);
-    assert_eq!(status["refused"][0]["count"], 20, "{status}");
+    eventually("all of them are refused", || {
+        daemon.status()["refused"][0]["count"] == 20
+    });
+    assert_eq!(daemon.status()["sources"][0]["attitudes"], 0);
     // Rows without a column of time, with it: all are used, the last ones at the latest after two seconds.
     let mut watcher =
         Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\",\"id\":\"board\"}");

@@ -159,7 +159,7 @@ fn bad_samples_follow_the_rules_of_conditioning_and_are_said_once_each() {
     let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
     let at = |n: u64, gyro: &str| {
         format!(
-            "{{\"class\":\"RATE\",\"id\":\"a\",\"stamp\":{{\"sec\":9,\"nsec\":{}}},\"gyro\":{gyro}}}",
+            "{{\"class\":\"RATE\",\"id\":\"a\",\"sample_kind\":\"rate\",\"stamp\":{{\"sec\":9,\"nsec\":{}}},\"gyro\":{gyro}}}",
             n * 1_000_000
         )
     };
@@ -273,5 +273,6 @@ fn a_sensor_that_changes_its_meaning_is_refused_and_missing_numbers_are_counted(
     assert_eq!(client.object("ERROR")["code"], "meaning_changed");
     let source = source(&daemon, "a", 2);
     assert_eq!(source["missing"], 4);
-    assert_eq!(source["sample_kind"], "rate");
+    // Nothing stated it: by the step of 5 ms.
+    assert_eq!(source["sample_kind"], "average");
 }

@@ -197,7 +197,7 @@ fn packed_or_as_lines_in_or_out_the_attitudes_are_the_same_to_the_bit_over_every
             true,
         ),
         (
-            r#""class":"RATE""#,
+            r#""class":"RATE","sample_kind":"rate""#,
             "gyro",
             r#""sample_kind":"rate""#,
             false,
@@ -461,7 +461,7 @@ fn numbers_are_of_one_connection_may_be_bound_anew_and_are_at_most_256() {
     // The rules of lines: a sensor has one sender, and one meaning.
     other.send_bytes(&[bind(5, "a").into_bytes(), Sample::lively(2).packed(5)].concat());
     assert_eq!(other.object("ERROR")["code"], "id_in_use");
-    client.send(r#"{"class":"PACKED","stream":6,"id":"a","sample_kind":"average"}"#);
+    client.send(r#"{"class":"PACKED","stream":6,"id":"a","sample_kind":"rotation"}"#);
     client.send_bytes(&Sample::lively(2).packed(6));
     assert_eq!(client.object("ERROR")["code"], "meaning_changed");
     for stream in 7..261 {

@@ -48,7 +48,7 @@ fn source(daemon: &Fed) -> Value {
 fn turning(n: u64) -> String {
     let t = n as f64 * 0.01;
     format!(
-        "{{\"id\":\"imu0\",\"stamp_ns\":{},\"gyro\":[{},{},0.5]}}",
+        "{{\"id\":\"imu0\",\"sample_kind\":\"rate\",\"stamp_ns\":{},\"gyro\":[{},{},0.5]}}",
         1_700_000_000_000_000_000 + n * 10_000_000,
         (3.0 * t).sin(),
         2.0 * (2.0 * t).cos()
@@ -92,8 +92,8 @@ fn after_a_reset_a_gyro_alone_is_one_that_begins_with_that_attitude() {
 fn levelled_anew_an_aided_attitude_is_level_at_once_and_what_was_learned_is_kept() {
     let mut daemon = Fed::of(&aided());
     // Its heading has become 90 degrees, which nothing but a reset takes away.
-    let first = std::iter::once(line(0)).chain([with("rpy=17.2,0,90")]);
-    let before = daemon.lines(first.chain((1..2000).map(line)));
+    let first = (0..5).map(line).chain([with("rpy=17.2,0,90")]);
+    let before = daemon.lines(first.chain((5..2000).map(line)));
     let heading = yaw(before.attitudes.last().unwrap());
     assert!((heading - 90.0).abs() < 1.0, "{heading}");
     let learned = source(&daemon)["aid"].clone();

@@ -19,7 +19,7 @@ const NOTHING: f64 = 4.0;
 pub struct FrozenAxis {
     /// Reading, source's unit.
     pub reading: f64,
-    /// Samples in a row that repeat it while another axis moves.
+    /// Samples in a row with it.
     pub samples: u64,
 }
 
@@ -96,10 +96,10 @@ impl Axis {
         self.moved += u64::from(other_moves);
         if self.moved >= LEAST && self.is_frozen() {
             let longest = self.found.map_or(0, |found| found.samples);
-            if self.moved > longest {
+            if self.run >= longest {
                 self.found = Some(FrozenAxis {
                     reading: rate,
-                    samples: self.moved,
+                    samples: self.run + 1,
                 });
             }
         }

@@ -255,7 +255,7 @@ impl Estimator {
     /// where stamps are regularised, which is not kept.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
-        let is_open = self.sample_kind.reason == KindReason::Unknown;
+        let is_open = self.open.is_some() && self.sample_kind.reason == KindReason::Unknown;
         if self.regulariser.is_some() || !self.beside.is_empty() || is_open {
             return None;
         }
@@ -277,9 +277,19 @@ impl Estimator {
     /// is as before, when that had other settings or no estimator can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
+        let open = self.open.clone();
         if let Some(choice) = memory.sample_kind() {
             self.keep_kind(choice);
         }
+        let fits = self.recall_of_kind(memory);
+        if let (false, Some(open)) = (fits, open) {
+            // Of another kind it would wait with its first sample until there is a step.
+            self.reopen(open);
+        }
+        fits
+    }
+
+    fn recall_of_kind(&mut self, memory: &Memory) -> bool {
         if self.regulariser.is_some() || self.settings != memory.settings {
             return false;
         }
@@ -600,12 +610,6 @@ impl Estimator {
     #[must_use]
     pub fn sample_kind(&self) -> KindChoice {
         self.sample_kind
-    }
-
-    /// Whether that stays so.
-    #[must_use]
-    pub fn is_kind_decided(&self) -> bool {
-        self.open.is_none()
     }
 
     /// Report of conditioning.

@@ -30,7 +30,7 @@ pub(super) enum Event {
 }
 
 /// Beginning of a stream whose kind is not decided for good.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct OpenKind {
     pub(super) plan: EstimationSettings,
     pub(super) resolved: Meaning,
@@ -93,10 +93,7 @@ impl Estimator {
             return;
         };
         let choice = open.choice_with(raw);
-        if choice.kind != self.sample_kind.kind {
-            self.begin_as(choice);
-        }
-        self.sample_kind = choice;
+        self.sample_kind = self.as_chosen(choice);
         match &mut self.open {
             Some(open) if !open.is_decided() => open.events.push(Event::Sample(*raw)),
             _ => self.open = None,
@@ -104,31 +101,39 @@ impl Estimator {
     }
 
     /// Decides the kind as an estimator of the same sensor has before.
-    pub fn keep_kind(&mut self, choice: KindChoice) {
+    pub(super) fn keep_kind(&mut self, choice: KindChoice) {
         if self.open.is_none() {
             return;
         }
-        if choice.kind != self.sample_kind.kind {
-            self.begin_as(choice);
-        }
-        self.sample_kind = choice;
+        self.sample_kind = self.as_chosen(choice);
         self.open = None;
     }
 
-    /// Begins again as of this kind, with what has come so far; attitudes that have left stay as they were.
-    fn begin_as(&mut self, choice: KindChoice) {
+    /// Becomes an estimator of the kind chosen; the choice that came of it.
+    fn as_chosen(&mut self, choice: KindChoice) -> KindChoice {
+        let is_made = choice.kind == self.sample_kind.kind || self.begin_as(choice);
+        let kind = match is_made {
+            true => choice.kind,
+            false => self.sample_kind.kind,
+        };
+        KindChoice { kind, ..choice }
+    }
+
+    /// Begins again as of this kind, with what has come so far; attitudes that have left stay as they were. `false`, and
+    /// nothing changes, where the settings allow no samples of this kind.
+    fn begin_as(&mut self, choice: KindChoice) -> bool {
         let Some(mut open) = self.open.take() else {
-            return;
+            return false;
         };
         self.make(&Sequential);
         let mut before = std::mem::take(&mut self.before);
         open.note_out(&before);
         let resolved = open.resolved.with_kind(&choice);
         let made = Estimator::live_of_kind(&open.plan, &resolved, &open.prepared);
-        // Settings that allow no such samples: they stay as they are.
         let Ok(mut made) = made else {
             self.before = before;
-            return;
+            self.open = Some(open);
+            return false;
         };
         made.watch_as(self, &resolved, &open.prepared);
         for event in &open.events {
@@ -139,6 +144,20 @@ impl Estimator {
         before.append(&mut made.before);
         made.before = before;
         made.open = Some(open);
+        *self = made;
+        true
+    }
+
+    /// Becomes what it was before its kind was decided: with `open`, and what came until then.
+    pub(super) fn reopen(&mut self, open: Box<OpenKind>) {
+        let Ok(mut made) = Estimator::live(&open.plan, &open.resolved, &open.prepared) else {
+            return;
+        };
+        made.watch_as(self, &open.resolved, &open.prepared);
+        for event in &open.events {
+            made.repeat(event);
+        }
+        made.left_until = open.last_out;
         *self = made;
     }
 
