@@ -263,7 +263,7 @@ pub fn delimited(data: &[u8]) {
 
 /// The same line by line, as it comes over a socket: every row that is held comes once, in order, and none after an error.
 fn table_stream(data: &[u8], options: &Options) {
-    let mut stream = TableStream::new(options, data.len() % 2 == 0);
+    let mut stream = TableStream::new(options, data.len().is_multiple_of(2));
     let mut samples = Vec::new();
     let mut last = 0;
     let mut held = |stream: &mut TableStream, (rows, skipped): (Vec<HeldRow>, u64)| {

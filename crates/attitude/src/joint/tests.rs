@@ -113,7 +113,7 @@ fn simulated(case: Case) -> Simulated {
         let phase = 5.0 * t;
         let angle = bend * (1.0 - (phase + 0.6).cos());
         let upright = if case.is_upright {
-            in_world([1.0, 0.0, 0.0], 1.570_796_3)
+            in_world([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2)
         } else {
             Quaternion::identity()
         };

@@ -219,13 +219,16 @@ struct Declared {
     field: Option<u16>,
 }
 
+/// Declares a channel: its topic, its schema, the kind of its samples.
+type Declare<'d> = &'d mut dyn FnMut(&str, [&str; 3], Option<SampleKind>) -> Result<u16>;
+
 impl Declared {
     /// Declares those of all streams: first every stream's own, then those beside them.
     fn of(
         streams: &[Stream],
         encoding: Encoding,
         attitude_schema: [&str; 3],
-        declare: &mut dyn FnMut(&str, [&str; 3], Option<SampleKind>) -> Result<u16>,
+        declare: Declare<'_>,
     ) -> Result<Vec<Declared>> {
         let mut all = Vec::new();
         for stream in streams {

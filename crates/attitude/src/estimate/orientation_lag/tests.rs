@@ -1,3 +1,4 @@
+#![allow(clippy::unwrap_used)]
 use super::*;
 use crate::estimate::plan::EstimationSettings;
 use crate::quaternion::YawPitchRoll;
