@@ -277,14 +277,20 @@ impl Estimator {
     /// is as before, when that had other settings or no estimator can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
-        let open = self.open.clone();
-        if let Some(choice) = memory.sample_kind() {
-            self.keep_kind(choice);
+        let Some(choice) = memory.sample_kind().filter(|_| self.open.is_some()) else {
+            return self.recall_of_kind(memory);
+        };
+        // Another one, since this one is to stay as it is: of a kind it would wait with its first sample for a step.
+        let mut other = match choice.kind == self.sample_kind.kind {
+            true => None,
+            false => self.of_kind(choice),
+        };
+        let fits = other.as_mut().unwrap_or(&mut *self).recall_of_kind(memory);
+        if let Some(other) = other.filter(|_| fits) {
+            *self = other;
         }
-        let fits = self.recall_of_kind(memory);
-        if let (false, Some(open)) = (fits, open) {
-            // Of another kind it would wait with its first sample until there is a step.
-            self.reopen(open);
+        if fits {
+            self.sample_kind.reason = choice.reason;
         }
         fits
     }
@@ -451,8 +457,10 @@ impl Estimator {
 
     /// Watches sensors and keeps innovations where the one before did, from the first sample on.
     pub(super) fn watch_as(&mut self, before: &Estimator, resolved: &Meaning, prepared: &Prepared) {
-        if before.watch.is_some() {
-            self.watch_sensors(resolved, prepared);
+        match (&before.watch, before.field_consistency()) {
+            (None, _) => {}
+            (_, Some(field)) if field.is_live() => self.watch_sensors_live(resolved, prepared),
+            _ => self.watch_sensors(resolved, prepared),
         }
         if before.integrator.keeps_innovations() {
             self.keep_innovations();

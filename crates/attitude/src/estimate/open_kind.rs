@@ -100,65 +100,35 @@ impl Estimator {
         }
     }
 
-    /// Decides the kind as an estimator of the same sensor has before.
-    pub(super) fn keep_kind(&mut self, choice: KindChoice) {
-        if self.open.is_none() {
-            return;
-        }
-        self.sample_kind = self.as_chosen(choice);
-        self.open = None;
-    }
-
     /// Becomes an estimator of the kind chosen; the choice that came of it.
     fn as_chosen(&mut self, choice: KindChoice) -> KindChoice {
-        let is_made = choice.kind == self.sample_kind.kind || self.begin_as(choice);
-        let kind = match is_made {
-            true => choice.kind,
-            false => self.sample_kind.kind,
-        };
+        if choice.kind != self.sample_kind.kind
+            && let Some(made) = self.of_kind(choice)
+        {
+            *self = made;
+        }
+        // Settings may allow no samples of that kind: they stay as they are.
+        let kind = self.sample_kind.kind;
         KindChoice { kind, ..choice }
     }
 
-    /// Begins again as of this kind, with what has come so far; attitudes that have left stay as they were. `false`, and
-    /// nothing changes, where the settings allow no samples of this kind.
-    fn begin_as(&mut self, choice: KindChoice) -> bool {
-        let Some(mut open) = self.open.take() else {
-            return false;
-        };
+    /// An estimator of this kind that has taken what has come so far; attitudes that have left stay as they were. `None`
+    /// where the kind is decided, or the settings allow no samples of this one.
+    pub(super) fn of_kind(&mut self, choice: KindChoice) -> Option<Estimator> {
         self.make(&Sequential);
-        let mut before = std::mem::take(&mut self.before);
-        open.note_out(&before);
+        let mut open = self.open.clone()?;
+        open.note_out(&self.before);
         let resolved = open.resolved.with_kind(&choice);
-        let made = Estimator::live_of_kind(&open.plan, &resolved, &open.prepared);
-        let Ok(mut made) = made else {
-            self.before = before;
-            self.open = Some(open);
-            return false;
-        };
+        let mut made = Estimator::live_of_kind(&open.plan, &resolved, &open.prepared).ok()?;
         made.watch_as(self, &resolved, &open.prepared);
         for event in &open.events {
             made.repeat(event);
         }
         made.left_until = open.last_out;
         made.make(&Sequential);
-        before.append(&mut made.before);
-        made.before = before;
+        made.before.splice(..0, self.before.iter().copied());
         made.open = Some(open);
-        *self = made;
-        true
-    }
-
-    /// Becomes what it was before its kind was decided: with `open`, and what came until then.
-    pub(super) fn reopen(&mut self, open: Box<OpenKind>) {
-        let Ok(mut made) = Estimator::live(&open.plan, &open.resolved, &open.prepared) else {
-            return;
-        };
-        made.watch_as(self, &open.resolved, &open.prepared);
-        for event in &open.events {
-            made.repeat(event);
-        }
-        made.left_until = open.last_out;
-        *self = made;
+        Some(made)
     }
 
     /// Leaves out the attitudes that have left as of another kind.
@@ -187,5 +157,35 @@ impl Estimator {
                 self.turn_heading(*heading);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::estimate::at_once;
+    use crate::propagate::Method;
+    use crate::record::{Declared, SampleKind};
+
+    #[test]
+    fn a_stream_that_turns_out_to_be_of_means_is_watched_in_bounded_memory_as_before() {
+        let plan = EstimationSettings {
+            method: Method::COMMIT,
+            ..EstimationSettings::default()
+        };
+        let sample = |n: i64| RawSample {
+            header: Some(Nanos(n * 5_000_000)),
+            gyro: Some([0.1, 0.01 * n as f64, 0.0]),
+            accel: Some([0.0, 0.0, 9.8]),
+            ..RawSample::default()
+        };
+        let meaning = Meaning::new(&plan, &Declared::default());
+        let prepared = at_once(&plan, &meaning, &[sample(0)]).unwrap();
+        let mut estimator = Estimator::live(&plan, &meaning, &prepared).unwrap();
+        estimator.watch_sensors_live(&meaning, &prepared);
+        (0..9).for_each(|n| estimator.take(&sample(n)));
+        assert_eq!(estimator.sample_kind().kind, SampleKind::Average);
+        assert!(estimator.field_consistency().unwrap().is_live());
     }
 }

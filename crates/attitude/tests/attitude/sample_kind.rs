@@ -149,3 +149,27 @@ fn a_heading_that_is_set_before_the_kind_is_known_stays_set() {
     );
     assert!((yaw(&open) - 1.0).abs() < 0.2);
 }
+
+#[test]
+fn what_another_estimator_remembers_under_other_settings_decides_no_kind() {
+    let raw = even(10 * MS);
+    let mut before = begun(&plan(None, Aid::Gravity), &raw[0]);
+    raw.iter().for_each(|raw| before.take(raw));
+    before.attitudes(&Sequential);
+    let memory = before.memory().unwrap();
+    let other = EstimationSettings {
+        gyro_range: Some(20.0),
+        ..plan(None, Aid::Gravity)
+    };
+    let mut fresh = begun(&other, &raw[0]);
+    let mut refusing = begun(&other, &raw[0]);
+    assert!(!refusing.recall(&memory));
+    for sample in &raw {
+        fresh.take(sample);
+        refusing.take(sample);
+        // No sample waits for the next one, the first neither.
+        let expected = fresh.attitudes(&Sequential);
+        assert_eq!(expected.len(), 1);
+        assert_eq!(refusing.attitudes(&Sequential), expected);
+    }
+}
