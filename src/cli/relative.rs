@@ -44,7 +44,7 @@ pub struct Relative {
     pub second_topic: Option<String>,
     /// Source of the heading of one relative to the other: hinge (the joint has one axis), recorded (both know north),
     /// start (both point the same way at the first common instant), auto (hinge where the motion shows one, else recorded)
-    #[arg(long, default_value = "auto", value_parser = ["auto", "hinge", "recorded", "start"])]
+    #[arg(long, default_value = "auto", value_parser = RelativeHeading::ALL.map(RelativeHeading::name))]
     pub heading: String,
     /// Write the joint's angle over time: .csv, or .sto for OpenSim; - is CSV on standard output
     #[arg(short, long, value_name = "FILE")]

@@ -437,3 +437,29 @@ fn a_folder_of_one_log_is_that_log_and_of_none_or_several_is_refused() {
         ],
     );
 }
+
+#[test]
+#[cfg_attr(not(has_python), ignore = "needs python3")]
+fn a_zip_of_a_phones_folder_gives_the_bits_of_the_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    phone(at).write(&at.join("walk"));
+    // By somebody else's writer: the folder in it, and its files alone.
+    for (archive, of, inside) in [("a.zip", "walk", "."), ("b.zip", ".", "walk")] {
+        let made = std::process::Command::new("python3")
+            .current_dir(at.join(inside))
+            .args(["-m", "zipfile", "-c"])
+            .arg(at.join(archive))
+            .arg(of)
+            .status()
+            .unwrap();
+        assert!(made.success());
+        for (from, to) in [("walk", "folder.csv"), (archive, "zip.csv")] {
+            strapd(at, &format!("replay {from} --aid gravity -o {to} --force")).done();
+        }
+        let read = |name: &str| std::fs::read_to_string(at.join(name)).unwrap();
+        assert!(read("folder.csv") == read("zip.csv"), "{archive}");
+        let said = strapd(at, &format!("info {archive} --json"));
+        assert!(said.done().out.contains("Gyroscope.csv"), "{said:?}");
+    }
+}

@@ -5,7 +5,7 @@
 
 use strapd_attitude::setting::COLUMNS;
 
-mod zip;
+pub(crate) mod zip;
 
 /// Number of a file's first bytes that are looked at. Of a stream eight are enough for most.
 pub const FIRST: usize = 1024;
@@ -190,7 +190,7 @@ pub fn foreign(first: &[u8], last: &[u8]) -> Option<Foreign> {
 /// begin in the middle of a line. Fewer bytes tell less.
 #[must_use]
 pub fn marked(first: &[u8], last: &[u8]) -> Option<Foreign> {
-    if first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06") {
+    if first.starts_with(zip::MARK) || first.starts_with(b"PK\x05\x06") {
         return of("a ZIP archive", &zip::way_in(last));
     }
     let has =

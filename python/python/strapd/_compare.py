@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Union
+from typing import Any, Literal, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,13 @@ def _track(name: str, track: Track) -> tuple[_inputs.Nanos, _inputs.Floats]:
     return nanos, rows
 
 
+def _covariance(track: Track) -> Optional[npt.NDArray[np.float64]]:
+    """Covariances of a track that states all of them."""
+    if isinstance(track, Attitude) and np.isfinite(track._cov).all():
+        return np.ascontiguousarray(track._cov)
+    return None
+
+
 def compare(a: Track, b: Track, align: Align = "first", *, world: str = "enu") -> dict[str, Any]:
     """How far the estimate ``a`` is from the reference ``b``: the numbers of ``strapd compare --json``, in degrees.
 
@@ -40,14 +47,11 @@ def compare(a: Track, b: Track, align: Align = "first", *, world: str = "enu") -
     """
     a_t, a_q = _track("a", a)
     b_t, b_q = _track("b", b)
-    covariance = None
-    if isinstance(a, Attitude) and np.isfinite(a._cov).all():
-        covariance = np.ascontiguousarray(a._cov)
     return _strapd.compare(
         a_t,
         a_q,
         a.world if isinstance(a, Attitude) else world,
-        covariance,
+        _covariance(a),
         b_t,
         b_q,
         b.world if isinstance(b, Attitude) else world,

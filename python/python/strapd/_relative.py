@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from . import _strapd
 from ._attitude import Attitude
-from ._compare import Track, _track
+from ._compare import Track, _covariance, _track
 
 RelativeHeading = Literal["auto", "hinge", "recorded", "start"]
 
@@ -37,12 +37,6 @@ class Relative:
     """Axes in both bodies, misfit, heading offsets at both ends and their sigma; ``None`` where the motion shows no hinge."""
     no_hinge: Optional[str]
     """Reason why there is no hinge."""
-
-
-def _covariance(track: Track) -> Optional[npt.NDArray[np.float64]]:
-    if isinstance(track, Attitude) and np.isfinite(track._cov).all():
-        return np.ascontiguousarray(track._cov)
-    return None
 
 
 def relative(a: Track, b: Track, heading: RelativeHeading = "auto", *, world: str = "enu") -> Relative:

@@ -4,14 +4,15 @@
 //! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
 //! come and go ([`run`]).
 //!
-//! Long because a sensor is one state: who continues it, which sample is its next and what is known of it are read from the
-//! same fields. What is decided without them is in the files below.
+//! Long because a sensor is one state: which sample is its next and what is known of it are read from the same fields. What
+//! is decided without them, and who continues it, is in the files below.
 
 mod arrival;
 pub(super) mod attitude_now;
 mod doubting;
 pub(super) mod doubts;
 mod intervals;
+mod joining;
 mod losing;
 mod resetting;
 pub mod run;
@@ -29,25 +30,25 @@ use crate::sink::Stream;
 use arrival::Arrivals;
 use doubts::Doubts;
 use intervals::Intervals;
+use joining::Joining;
 pub use losing::Fate;
 use losing::Losing;
 use resetting::Resetting;
-use run::{OrderedBy, RunPlacement, SampleRun, Span};
+use run::SampleRun;
 use stamp_unit::StampUnit;
 use stamps::{Stamps, TimedSamples};
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Duration;
-use strapd_attitude::condition::{Clock, Report, StampRepair};
+use strapd_attitude::condition::{Report, StampRepair};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Aid, EstimationSettings, Forces, Memory};
+use strapd_attitude::estimate::{Aid, EstimationSettings, Memory};
 use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use strapd_attitude::record::{Declared, TimeUnit};
-use strapd_recording::decode::{Ambiguous, Bare, Line};
+use strapd_recording::decode::{Ambiguous, Line};
 use strapd_recording::recording::early_besides;
 
 /// Bit that says that unused forces were logged; the bits below are verdicts.
@@ -55,9 +56,6 @@ const FORCES: u32 = 1 << 31;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;
-
-/// Nobody who goes on in the same unit begins later than so long after the last stamp.
-const NEAR_NANOS: i64 = 3_600_000_000_000;
 
 /// One sensor: its estimator, what its attitudes are called, and what has been said of it.
 #[derive(Debug)]
@@ -109,17 +107,6 @@ pub struct SensorStream {
     has_unused_forces: bool,
     /// Forces and fields that came before the first rate, the last few.
     early: VecDeque<RawSample>,
-}
-
-/// Progress in finding where a sender stands.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Joining {
-    /// Undecided: no stamp of it has come yet.
-    Undecided,
-    /// Repetition: it sends again what was taken, up to this.
-    Again(Nanos),
-    /// Joined: it is where the run is.
-    Joined,
 }
 
 /// The plan as it is for live streams: `auto` is the method without latency.
@@ -280,16 +267,6 @@ impl SensorStream {
         calibration::described(known, &self.id, "live", self.last.as_ref())
     }
 
-    /// Somebody else sends it from now on, and hears again what is wrong with its samples.
-    pub fn meet(&mut self) {
-        self.joining = Joining::Undecided;
-        self.told = 0;
-        self.counted = self.conditioning().counts;
-        self.intervals.reopen();
-        self.stamp_unit.meet();
-        self.arrivals = None;
-    }
-
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
     /// are. Those whose stamps are bare numbers wait for the unit of all.
     pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<TimedSamples> {
@@ -344,169 +321,6 @@ impl SensorStream {
             id: Some(self.id.to_string()),
             ..Fault::new("ambiguous_stamp", why.to_string())
         });
-    }
-
-    /// Whether a new connection's first number goes on in the unit settled for the run; where it does
-    /// not, that may be another run, or somebody who counts in another unit.
-    fn continues(&self, bare: Bare) -> bool {
-        let (Some(span), Some(unit)) = (self.span(), self.stamps.unit()) else {
-            return false;
-        };
-        let stamp = bare.in_unit(unit);
-        span.first.is_some_and(|first| stamp > first) && stamp.since(span.last) < NEAR_NANOS
-    }
-
-    fn span(&self) -> Option<Span> {
-        match &self.saved {
-            Some(saved) => Some(saved.span()),
-            None => self.conditioning().last.map(|last| Span {
-                first: self.first,
-                last,
-            }),
-        }
-    }
-
-    /// Decides by the first stamp of a sender whether the run goes on, before samples are taken.
-    /// `plan` is that of [`SensorStream::new`]. What is to be known of a run that has begun comes back.
-    ///
-    /// # Errors
-    /// The fault to answer with: a run cannot begin with these samples.
-    pub fn join(
-        &mut self,
-        plan: &EstimationSettings,
-        samples: &[RawSample],
-        window: Duration,
-        placed: OrderedBy,
-    ) -> Result<Option<Fault>, Fault> {
-        if self.joining != Joining::Undecided || samples.iter().all(|raw| raw.is_beside) {
-            return Ok(None);
-        }
-        let span = self.span();
-        let near = span.map_or(Nanos(0), |span| span.last);
-        let first = samples
-            .iter()
-            .filter(|raw| !raw.is_beside)
-            .find_map(|raw| Some((raw, self.estimator.stamp_of(raw, near)?)));
-        let (span, raw, stamp) = match (span, first) {
-            (Some(span), Some((raw, stamp))) => (span, raw, stamp),
-            // Nothing to stand in yet, or nothing that tells where.
-            (None, Some(_)) => {
-                self.joining = Joining::Joined;
-                return Ok(None);
-            }
-            (_, None) if matches!(plan.clock, Clock::Index { .. }) => {
-                self.go_on(plan, None);
-                return Ok(None);
-            }
-            (_, None) => return Ok(None),
-        };
-        match span.standing(stamp, window, placed) {
-            RunPlacement::GoesOn => {
-                self.go_on(plan, Some(stamp));
-                Ok(None)
-            }
-            RunPlacement::Again => {
-                self.joining = Joining::Again(span.last);
-                Ok(None)
-            }
-            RunPlacement::Anew => self.begin_anew(plan, raw, stamp, span).map(Some),
-        }
-    }
-
-    /// The run goes on with a sample stamped so.
-    fn go_on(&mut self, plan: &EstimationSettings, stamp: Option<Nanos>) {
-        self.joining = Joining::Joined;
-        let Some(saved) = self.saved.take() else {
-            return;
-        };
-        self.first = saved.span().first;
-        let step = stamp.map(|stamp| stamp.since(saved.span().last));
-        let is_near = step.is_some_and(|step| plan.bridges(step));
-        let resumed = match saved.memory().filter(|_| is_near) {
-            Some(memory) if self.estimator.recall(memory) => Ok(()),
-            _ => saved
-                .attitude(self.channel.stream())
-                .and_then(|last| self.estimator.resume(&last)),
-        };
-        match resumed {
-            Ok(()) => "as saved before the restart".clone_into(&mut self.prepared.initial_origin),
-            Err(why) => self.prepared.warnings.push(why),
-        }
-        self.last = saved.attitude(self.channel.stream()).ok();
-    }
-
-    /// A run begins with `raw`: the world is there anew, and only what was counted goes on.
-    fn begin_anew(
-        &mut self,
-        plan: &EstimationSettings,
-        raw: &RawSample,
-        stamp: Nanos,
-        before: Span,
-    ) -> Result<Fault, Fault> {
-        let fault = |what: Diagnostic| Fault {
-            id: Some(self.id.to_string()),
-            ..Fault::new("not_ready", what.to_string())
-        };
-        let forces = self.prepared.aiding.map(|aiding| aiding.forces);
-        let plan = &expecting(plan, forces == Some(Forces::Beside));
-        let mut prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
-        prepared.has_arrival = plan.stamps == StampRepair::Auto;
-        prepared.batches = self.conditioning().batches;
-        let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
-        let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
-        if labels.world_axes != self.channel.stream().world_axes {
-            return Err(fault(format!(
-                "a run that begins between other axes ({}) than those announced ({}); give it another `id`",
-                labels.world_axes,
-                self.channel.stream().world_axes
-            ).into()));
-        }
-        let saved = self.saved.take().map(|saved| saved.resets());
-        let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
-        estimator.continue_counts_of(self.conditioning(), resets);
-        if let Some(doubts) = &mut self.doubts {
-            doubts.begin(&self.resolved, &prepared, &mut estimator);
-        }
-        (self.estimator, self.prepared) = (estimator, prepared);
-        (self.first, self.last) = (None, None);
-        self.joining = Joining::Joined;
-        self.intervals.begin();
-        self.stamp_unit.begin();
-        self.runs += 1;
-        let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
-        let seen = match before.first {
-            Some(first) => format!("{:.6} s to {:.6} s", secs(first), secs(before.last)),
-            None => format!("until {:.6} s", secs(before.last)),
-        };
-        Ok(Fault {
-            id: Some(self.id.to_string()),
-            ..Fault::new(
-                "new_run",
-                format!(
-                    "the first stamp of this connection, {:.6} s, was passed already ({seen}): a new run begins, reset {}",
-                    secs(stamp),
-                    resets.saturating_add(1)
-                ),
-            )
-        })
-    }
-
-    /// Whether a sample is one that was taken before, and now is only counted.
-    fn is_again(&mut self, plan: &EstimationSettings, raw: &RawSample) -> bool {
-        let Joining::Again(last) = self.joining else {
-            return false;
-        };
-        match self.estimator.stamp_of(raw, last) {
-            Some(stamp) if stamp > last => {
-                self.go_on(plan, Some(stamp));
-                false
-            }
-            Some(stamp) => {
-                self.estimator.take_late(stamp);
-                true
-            }
-            None => false,
-        }
     }
 
     /// Takes samples in the order they came, by the `plan` of [`SensorStream::new`]. The attitudes they

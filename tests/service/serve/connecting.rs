@@ -243,7 +243,7 @@ fn a_daemon_behind_a_daemon_integrates_the_same_rates_to_the_same_attitude() {
             assert_eq!(without_rate(&a), without_rate(&b));
             for (near, far) in numbers(&a).into_iter().zip(numbers(&b)) {
                 // A mean rate is told by its angle and its interval, which rounds it once more at each daemon.
-                assert!((near - far).abs() < 1e-15 * 10.0, "{a} {b}");
+                assert!((near - far).abs() < 1e-14, "{a} {b}");
             }
         }
         assert!(second.stop());

@@ -9,8 +9,10 @@ use crate::text::printable;
 const ENTRY: &[u8] = b"PK\x01\x02";
 const ENTRY_LEN: usize = 46;
 
+/// Mark of an archive that holds something.
+pub(crate) const MARK: &[u8; 4] = b"PK\x03\x04";
 /// Most members that are looked at.
-const MOST: usize = 10_000;
+pub(crate) const MOST: usize = 10_000;
 
 /// The command that takes out the member most likely meant, as far as `last` tells.
 pub(super) fn way_in(last: &[u8]) -> String {

@@ -3,8 +3,10 @@
 //! Apart from the folder because an archive is data from outside: its directory may lie about names, sizes and their
 //! number. Phones export a folder of tables as one archive; unpacked it is that folder.
 
+use super::input::MOST as MOST_BYTES;
 use crate::error::{Error, Result};
 use crate::format::open;
+use crate::recognise::zip::{MARK, MOST as MOST_MEMBERS};
 use crate::text::printable;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,10 +17,6 @@ use tempfile::TempDir;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-/// Members that are looked at.
-const MOST_MEMBERS: usize = 10_000;
-/// Bytes that are unpacked at most, whatever the archive says of its sizes.
-const MOST_BYTES: u64 = 8 << 30;
 /// Bytes that one byte unpacks to at most: deflate reaches 1032. Members that share their bytes would exceed it.
 const MOST_RATIO: u64 = 1032;
 
@@ -46,7 +44,7 @@ pub(super) fn is_zip(path: &Path) -> bool {
     let mut head = [0; 4];
     File::open(path)
         .and_then(|mut file| file.read_exact(&mut head))
-        .is_ok_and(|()| &head == b"PK\x03\x04")
+        .is_ok_and(|()| &head == MARK)
 }
 
 /// Unpacks the files of the topmost folder that has any. Names with `..`, a drive or a root are left out.
@@ -78,6 +76,7 @@ pub(super) fn unpack(path: &Path) -> Result<Unpacked> {
         )
     };
     let folder = tempfile::tempdir().map_err(|e| no_room(&e))?;
+    // Whatever the archive says of its sizes.
     let most = MOST_BYTES.min(size.saturating_mul(MOST_RATIO));
     let mut left = most;
     for (name, index) in members {

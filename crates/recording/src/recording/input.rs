@@ -26,7 +26,7 @@ use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 
 /// Bytes of a stream that are kept at most.
-const MOST: u64 = 8 << 30;
+pub(super) const MOST: u64 = 8 << 30;
 /// Bytes of a text elsewhere that are fetched before they are read.
 const TEXT_AHEAD: u64 = 32 << 20;
 

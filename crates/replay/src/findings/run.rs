@@ -329,41 +329,30 @@ fn spikes(report: &Report) -> Option<Finding> {
     let found = report.spikes;
     let at = found.first.zip(report.first);
     let at = at.map_or(0.0, |(spike, first)| spike.secs_since(first));
-    let largest = significant(found.largest, 3);
-    (found.samples > 0).then(|| {
+    let done = format!(", first {at:.3} s after the start: repaired");
+    let finding = spikes_of((found.samples, found.largest), &done)?.with("first_at_s", at);
+    let advice = "each was replaced by the line between its neighbours; to leave them as recorded";
+    Some(finding.advise(advice).help([SPIKES.to("keep")]))
+}
+
+fn spikes_of((samples, largest): (u64, f64), done: &str) -> Option<Finding> {
+    let shown = significant(largest, 3);
+    (samples > 0).then(|| {
         Finding::new(
             Severity::Warning,
             "spikes",
-            format!(
-                "{} spikes of the gyro, up to {largest} rad/s, first {at:.3} s after the start: repaired",
-                found.samples
-            ),
+            format!("{samples} spikes of the gyro, up to {shown} rad/s{done}"),
         )
-        .with("count", found.samples)
-        .with("largest_rad_s", found.largest)
-        .with("first_at_s", at)
-        .advise("each was replaced by the line between its neighbours; to leave them as recorded")
-        .help([SPIKES.to("keep")])
+        .with("count", samples)
+        .with("largest_rad_s", largest)
     })
 }
 
 /// The same in a stream that waits for nothing.
 fn spikes_left(report: &Report) -> Option<Finding> {
     let found = report.spikes_left;
-    let largest = significant(found.largest, 3);
-    (found.samples > 0).then(|| {
-        Finding::new(
-            Severity::Warning,
-            "spikes",
-            format!(
-                "{} spikes of the gyro, up to {largest} rad/s: left as they came",
-                found.samples
-            ),
-        )
-        .with("count", found.samples)
-        .with("largest_rad_s", found.largest)
-        .advise("a live stream waits for no later sample: mend the bus or its driver; a recording is repaired")
-    })
+    let finding = spikes_of((found.samples, found.largest), ": left as they came")?;
+    Some(finding.advise("a live stream waits for no later sample: mend the bus or its driver; a recording is repaired"))
 }
 
 fn no_reference(found: u64) -> Finding {

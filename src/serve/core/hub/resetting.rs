@@ -62,7 +62,9 @@ impl Hub {
         let sensor = read(&self.sensors.by_id).get(asked.sensor()).cloned();
         let sensor = sensor.ok_or_else(unknown)?;
         let mut sensor = lock(&sensor);
-        if sensor.gave_way {
+        // Its place was made for samples that are still to be taken: nobody is known to send it yet.
+        let is_new = sensor.owner.is_none() && sensor.stream.span().is_none();
+        if sensor.gave_way || is_new {
             return Err(unknown());
         }
         let is_others = |client: u64| {
