@@ -185,6 +185,34 @@ for name, options in {
     writer.finish()
     seed("mcap", name, file.getvalue())
 
+# Frames of a vehicle's link, without the times that a ground station puts before them.
+log = (here.parents[1] / "fixtures/ardupilot.tlog").read_bytes()
+frames, at = b"", 0
+while at < len(log):
+    mark, length, flags = log[at + 8 : at + 11]
+    end = at + 8 + length + (8 if mark == 0xFE else 12 + 13 * (flags & 1))
+    frames += log[at + 8 : end]
+    at = end
+seed("mcap", "mavlink_capture", frames[:2500])
+
+
+def layout(of, size, name, letters, columns):
+    return struct.pack("<BBBBB4s16s64s", 0xA3, 0x95, 0x80, of, size, name, letters, columns)
+
+
+# A log of ArduPilot, after its LogStructure.h.
+log = layout(0x80, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+log += layout(0x81, 54, b"IMU", b"QBffffffIIfBBHH", b"TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz")
+log += layout(0x82, 18, b"MAG", b"QBhhh", b"TimeUS,I,MagX,MagY,MagZ")
+log += layout(0x83, 28, b"ATT", b"QccccCCCCB", b"TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF")
+for n in range(10):
+    t = 10_000_000 + 2500 * n
+    for i in range(2):
+        log += struct.pack("<BBBQBffffffIIfBBHH", 0xA3, 0x95, 0x81, t, i, 0.1 * n, 0.2, 0.3, 0.1, 0.2, -9.8, 0, 0, 35.0, 1, 1, 400, 400)
+    log += struct.pack("<BBBQBhhh", 0xA3, 0x95, 0x82, t, 0, 200, -50, 400)
+    log += struct.pack("<BBBQhhhhHHHHB", 0xA3, 0x95, 0x83, t, 0, 1000, 0, -500, 0, 4000, 0, 0, 1)
+seed("mcap", "dataflash", log)
+
 # Tables of text, after their makers' documentation.
 
 

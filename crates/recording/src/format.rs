@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::records::MAGIC;
 use crate::records::transcript::Transcribe;
 use crate::text::without_mark;
-use crate::{bag, delimited, gpmf, mavlink, parquet, recognise, sqlite, ulog};
+use crate::{bag, dataflash, delimited, gpmf, mavlink, parquet, recognise, sqlite, ulog};
 use std::fs::File;
 use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -28,6 +28,10 @@ pub enum Format {
     Gpmf,
     /// A telemetry log of a ground station: frames of MAVLink with times.
     Tlog,
+    /// Frames of MAVLink as they came over a link.
+    Mavlink,
+    /// A log of ArduPilot's flight controllers.
+    DataFlash,
     /// One JSON object per line.
     Lines,
     /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
@@ -138,6 +142,26 @@ const ROWS: &[Row] = &[
         may_look_like: mavlink::may_be_log,
         endings: &["tlog"],
         reading: Reading::Transcribed(|| Box::new(mavlink::Transcriber::default())),
+        ..LOG
+    },
+    Row {
+        format: Format::Mavlink,
+        name: "MAVLink capture",
+        magic: &[],
+        looks_like: mavlink::is_capture,
+        may_look_like: mavlink::may_be_capture,
+        // Nobody has one for it.
+        endings: &[],
+        reading: Reading::Transcribed(|| Box::new(mavlink::Transcriber::of_capture())),
+        ..LOG
+    },
+    Row {
+        format: Format::DataFlash,
+        name: "ArduPilot DataFlash",
+        magic: &dataflash::MAGIC,
+        // Others call theirs .bin, too.
+        endings: &[],
+        reading: Reading::Transcribed(|| Box::new(dataflash::Transcriber::default())),
         ..LOG
     },
     Row {

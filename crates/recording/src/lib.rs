@@ -40,7 +40,8 @@
 //! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
 //! | `rosbag2` | recordings of ROS 2 in SQLite -> the records MCAP has for them | pure |
 //! | `gpmf` | telemetry of GoPro's cameras, alone or in a video -> the records MCAP has for it | pure |
-//! | `mavlink` | telemetry logs of ground stations -> the records MCAP has for them | pure |
+//! | [`mavlink`] | telemetry logs of ground stations -> the records MCAP has for them | pure |
+//! | `dataflash` | logs of ArduPilot's flight controllers -> the records MCAP has for them | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
@@ -54,6 +55,7 @@ pub mod address;
 pub mod attitude_line;
 mod bag;
 mod columns;
+mod dataflash;
 pub mod decode;
 pub mod delimited;
 pub mod error;
@@ -61,7 +63,7 @@ pub mod format;
 mod gpmf;
 pub mod json_fault;
 pub mod lines;
-mod mavlink;
+pub mod mavlink;
 pub mod mcap;
 #[cfg(feature = "parquet")]
 mod parquet;

@@ -54,7 +54,7 @@ pub use survey::{ChannelSurvey, PassedChunks, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
-use crate::format::{Format, LONGEST_MAGIC, Reading, is_video};
+use crate::format::{self, Format, LONGEST_MAGIC, Reading, is_video};
 use crate::recognise::{self, Foreign};
 use crate::remote_object::{self, Object};
 use index::Index;
@@ -197,10 +197,10 @@ impl Reader {
             let read = from.by_ref().take(more as u64).read_to_end(&mut magic);
             read.map_err(|e| read_error(&name, 0, e))?;
             let is_open = magic.len() > have && Format::may_be_log(&magic);
-            more = if is_open {
-                LONGEST_MAGIC - magic.len()
-            } else {
-                0
+            more = match LONGEST_MAGIC.checked_sub(magic.len()) {
+                _ if !is_open => 0,
+                None | Some(0) => SHOWN_MORE,
+                Some(rest) => rest,
             };
         }
         let Some(format) = Format::of_log(&magic) else {
@@ -288,6 +288,9 @@ impl DatabaseSidecars {
     }
 }
 
+/// Bytes of a stream that are looked at next, where its first ones tell too little.
+const SHOWN_MORE: usize = 256;
+
 /// Bytes of an object that are fetched before they are asked for.
 const AHEAD: u64 = WalkOptions::IN_FLIGHT as u64;
 
@@ -312,7 +315,7 @@ fn format_of(file: &LogFile) -> Result<Format> {
         bytes.truncate(have);
         Ok(bytes)
     };
-    let head = read(0, LONGEST_MAGIC)?;
+    let head = read(0, format::HEAD)?;
     if let Some(format) = Format::of_log(&head)
         && (!is_video(&head)
             || container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)

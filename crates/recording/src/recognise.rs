@@ -60,13 +60,6 @@ const KNOWN: &[FormatMark] = &[
     ),
     (
         0,
-        &[0xa3, 0x95, 0x80],
-        "an ArduPilot DataFlash log (binary)",
-        "pip install pymavlink; mavlogdump.py --types IMU --format json FILE > imu.ndjson; \
-         strapd replay imu.ndjson --body frd",
-    ),
-    (
-        0,
         b"FMT, 128",
         "an ArduPilot DataFlash log (text)",
         "pip install pymavlink; mavlogdump.py --types IMU --format json FILE > imu.ndjson; \

@@ -19,13 +19,15 @@ pub struct LineParameters {
     pub rows: Vec<RowFilter>,
     /// Whether a sample without a stamp has that of its arrival (`?stamp=arrival`).
     pub by_arrival: bool,
+    /// Whether its bytes are frames of MAVLink (`?protocol=mavlink`).
+    pub is_mavlink: bool,
 }
 
 impl LineParameters {
     /// Names of the parameters.
-    pub const KEYS: [&str; 5] = ["id", "columns", "delimiter", "where", "stamp"];
+    pub const KEYS: [&str; 6] = ["id", "columns", "delimiter", "where", "stamp", "protocol"];
     /// Help for an address with others.
-    pub const HELP: &str = "?id=NAME names the sensor; ?columns=ROLE=NAMES,..., ?delimiter=MARK and ?where=COLUMN=VALUE read rows of a table; ?stamp=arrival stamps samples without a stamp when they come";
+    pub const HELP: &str = "?id=NAME names the sensor; ?columns=ROLE=NAMES,..., ?delimiter=MARK and ?where=COLUMN=VALUE read rows of a table; ?stamp=arrival stamps samples without a stamp when they come; ?protocol=mavlink reads frames of MAVLink";
 
     /// Reads the parameters among those of an address.
     ///
@@ -68,6 +70,14 @@ impl LineParameters {
                     return Err(format!("?stamp={other}: arrival is the one there is"));
                 }
             },
+            is_mavlink: match of("protocol")? {
+                None | Some("lines") => false,
+                Some("mavlink") => true,
+                Some(other) => {
+                    let other = strapd_recording::text::printable(other);
+                    return Err(format!("?protocol={other}: mavlink or lines"));
+                }
+            },
         })
     }
 }
@@ -85,6 +95,7 @@ impl LineParameters {
                 false => self.rows,
             },
             by_arrival: self.by_arrival || by_default.by_arrival,
+            is_mavlink: self.is_mavlink || by_default.is_mavlink,
         }
     }
 }
@@ -100,6 +111,8 @@ pub struct Reading {
     pub(super) decoder: LineDecoder,
     /// Whether a sample without a stamp has that of its arrival.
     pub(super) by_arrival: bool,
+    /// Whether its bytes are frames of MAVLink.
+    pub(super) is_mavlink: bool,
     /// Whether lines that are no objects may be rows of a table.
     takes_rows: bool,
     /// Whether the bytes may begin within a line.
@@ -121,7 +134,8 @@ impl Reading {
             decoder: LineDecoder::new(&options).with_besides(),
             options,
             by_arrival: asked.by_arrival,
-            takes_rows: true,
+            is_mavlink: asked.is_mavlink,
+            takes_rows: !asked.is_mavlink,
             is_midway: false,
         }
     }
@@ -180,6 +194,7 @@ mod tests {
             ("delimiter=7", "?delimiter=: one of tab"),
             ("where=device", "?where=: `device` is no COLUMN=VALUE"),
             ("stamp=ntp", "?stamp=ntp: arrival"),
+            ("protocol=morse", "?protocol=morse: mavlink or lines"),
         ] {
             let why = parsed(query).err().unwrap_or_default();
             assert!(why.contains(words), "{query}: {why}");

@@ -7,6 +7,7 @@
 #[cfg(feature = "zenoh")]
 mod decoded;
 mod line;
+mod link;
 mod losing;
 mod opening;
 mod resetting;
@@ -36,6 +37,7 @@ use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Line;
 use strapd_recording::decode::framing::Framer;
+use strapd_recording::mavlink::Link;
 use turn::{PendingBytes, WorkSlice};
 
 /// Errors said at once before they are thinned.
@@ -94,6 +96,8 @@ pub struct Session {
     hub: Arc<Hub>,
     client: Arc<Client>,
     framer: Framer,
+    /// Reader of its bytes, where they are no lines.
+    link: Option<Link>,
     side: Side,
     reading: Arc<Reading>,
     rows: Rows,
@@ -157,6 +161,7 @@ impl Session {
             hub: hub.clone(),
             client,
             framer: Framer::new(),
+            link: None,
             errors_in_a_row: 0,
             errors: Allowance::new(BURST),
             told: BTreeSet::new(),
@@ -174,6 +179,7 @@ impl Session {
     pub fn reading(mut self, reading: Arc<Reading>) -> Session {
         let are_taken = reading.takes_rows() && self.side.takes_rows();
         self.rows = Rows::taken(are_taken && self.hub.takes_samples());
+        self.link = reading.is_mavlink.then(Link::default);
         self.reading = reading;
         self
     }

@@ -101,7 +101,10 @@ async fn converse(
         asked: source.protocol == Protocol::Strapd,
         asked_again: false,
         flood: Flood::default(),
-        legibility: serial(source).map(|_| Legibility::default()),
+        // What is no text is read by its frames.
+        legibility: serial(source)
+            .filter(|_| !source.lines.is_mavlink)
+            .map(|_| Legibility::default()),
     };
     talk.go_on(running).await.err()
 }

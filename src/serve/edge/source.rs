@@ -279,7 +279,8 @@ impl Source {
             lines.id.get_or_insert_with(|| place.sensor());
         }
         Ok(Source {
-            id: lines.id.clone().filter(|_| !is_serial),
+            // Of a link it goes before the names of its sensors.
+            id: lines.id.clone().filter(|_| !is_serial && !lines.is_mavlink),
             lines,
             protocol,
             token,

@@ -54,7 +54,7 @@ fn a_log_of_another_format_is_called_by_its_name_with_the_command_that_makes_it_
         ),
         (
             "00000042.BIN",
-            &[0xa3, 0x95, 0x80, 0x80, 0x59, 0x46, 0x4d, 0x54],
+            b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n",
             "ArduPilot DataFlash",
             "mavlogdump.py --types IMU --format json 00000042.BIN",
         ),

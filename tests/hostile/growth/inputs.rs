@@ -162,6 +162,18 @@ fn own_types(length: usize) -> Vec<u8> {
     })
 }
 
+/// Two heartbeats, by which captured bytes of a link are known.
+fn capture_head() -> Vec<u8> {
+    let frame = |n: u8| {
+        let mut frame = vec![0xfe, 9, n, 1, 1, 0];
+        frame.extend([0; 9]);
+        let sum = strapd_recording::mavlink::checksum(&frame[1..], 50);
+        frame.extend(sum.to_le_bytes());
+        frame
+    };
+    [frame(0), frame(1)].concat()
+}
+
 /// A recording of ROS 2 in pages of 1 kB.
 fn sqlite(length: usize) -> Vec<u8> {
     let data = [0; 100];
@@ -483,6 +495,10 @@ pub(crate) const CASES: &[Case] = cases! {
         "tlog: garbage": |n| [&b"\0\x06\0\0\0\0\0\0\xfd\xff\0"[..], &vec![0x55; n]].concat();
         "tlog: times": |n| b"\0\x06\0\0\0\0\0\0\xfe\xff".repeat(n / 10);
         "tlog: messages that are not read": |n| b"\0\x06\0\0\0\0\0\0\xfe\0\0\0\0\x07\0\0".repeat(n / 16);
+        "MAVLink capture: marks": |n| [capture_head(), b"\xfd\x09\0".repeat(n / 3)].concat();
+        "MAVLink capture: messages that are not read": |n| [capture_head(), b"\xfe\0\0\0\0\x07\0\0".repeat(n / 8)].concat();
+        "DataFlash: garbage": |n| [&b"\xa3\x95\x80"[..], &vec![0x55; n]].concat();
+        "DataFlash: marks": |n| b"\xa3\x95\x80".repeat(n / 3);
         "GPMF: empty devices": |n| b"DEVC\0\x01\0\0".repeat(n / 8);
         "GPMF: devices that go on behind the end": |n| b"DEVC\0\xff\xff\xff".repeat(n / 8);
         "GPMF: garbage": |n| [&b"DEVC\0\x01\0\0"[..], &vec![0x55; n]].concat();

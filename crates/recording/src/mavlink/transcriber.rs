@@ -3,8 +3,9 @@
 //! Apart from the frames because it alone decides where one begins: a frame is believed by its checksum, or, where
 //! that cannot be known, if another follows it.
 
-use super::frame::{Checked, Frame, LONGEST, frame, is_log};
+use super::frame::{Checked, Frame, LONGEST, STAMP, begins, frame};
 use super::message;
+use super::sequence::{Sequences, topic};
 use crate::decode::known_definition;
 use crate::records::imu;
 use crate::records::problem::{ProblemKind, Problems};
@@ -12,7 +13,9 @@ use crate::records::transcript::{ReadProgress, Transcribe, Transcript};
 use std::collections::BTreeMap;
 
 /// Bytes looked at to believe a frame, and to find one.
-const WINDOW: usize = LONGEST + 16;
+const WINDOW: usize = 3 * LONGEST;
+/// Frames that must follow one of a capture which is none that is read: its marks are two bytes.
+const CHAIN: usize = 2;
 
 /// Sender of a sample: system, component, name of the message, sensor.
 type Sender = (u8, u8, &'static str, u8);
@@ -21,6 +24,9 @@ type Sender = (u8, u8, &'static str, u8);
 #[derive(Debug, Default)]
 pub(crate) struct Transcriber {
     at: u64,
+    /// Whether no time stands before a frame.
+    is_bare: bool,
+    sequences: Sequences,
     channels: BTreeMap<Sender, (u16, u32)>,
     /// The first that sent a sample: its topics have plain names.
     first: Option<(u8, u8)>,
@@ -35,9 +41,11 @@ impl Transcribe for Transcriber {
         if ahead.len() < WINDOW && !is_end {
             return ReadProgress::Need(WINDOW);
         }
-        let used = match frame(ahead) {
-            Ok(found) if is_believed(&found, ahead) => {
+        let stamp = self.stamp();
+        let used = match frame(ahead, stamp) {
+            Ok(found) if is_believed(&found, ahead, stamp) => {
                 self.found();
+                self.count(&found);
                 match found.checked {
                     Checked::Wrong => {
                         self.fault(ProblemKind::Checksum, Some(1));
@@ -49,7 +57,7 @@ impl Transcribe for Transcriber {
                 found.total
             }
             // The end, unless another frame begins within it.
-            Err(Some(need)) if is_end && !has_frame(ahead) => {
+            Err(Some(need)) if is_end && !has_frame(ahead, stamp) => {
                 self.found();
                 let (need, have) = (need as u64, ahead.len() as u64);
                 self.fault(ProblemKind::Truncated { need, have }, None);
@@ -57,8 +65,8 @@ impl Transcribe for Transcriber {
             }
             _ => {
                 self.lost.get_or_insert(self.at);
-                let begins = |at: &usize| ahead.get(*at..).is_some_and(is_log);
-                let next = (1..ahead.len()).find(begins);
+                let may_be = |at: &usize| ahead.get(*at..).is_some_and(|a| begins(a, stamp));
+                let next = (1..ahead.len()).find(may_be);
                 // What could begin a time is looked at again with what follows it.
                 let most = if is_end { ahead.len() } else { ahead.len() - 9 };
                 next.unwrap_or(most).min(most).max(1)
@@ -81,6 +89,31 @@ impl Transcribe for Transcriber {
 }
 
 impl Transcriber {
+    /// Begins with captured bytes of a link.
+    pub(crate) fn of_capture() -> Transcriber {
+        Transcriber {
+            is_bare: true,
+            ..Transcriber::default()
+        }
+    }
+
+    fn stamp(&self) -> usize {
+        if self.is_bare { 0 } else { STAMP }
+    }
+
+    /// Counts the frames that a sender of a capture has numbered and that are not there. A log of a ground station may
+    /// hold several links, each with a part of them.
+    fn count(&mut self, found: &Frame<'_>) {
+        if !self.is_bare {
+            return;
+        }
+        let missing = self.sequences.missing(found);
+        if missing > 0 {
+            let count = u64::from(missing);
+            self.fault(ProblemKind::FramesMissing { count }, Some(count));
+        }
+    }
+
     /// Tells of the bytes before that were none.
     fn found(&mut self) {
         if let Some(offset) = self.lost.take() {
@@ -115,19 +148,17 @@ impl Transcriber {
                     let text = known_definition(imu::TYPE).unwrap_or_default();
                     to.schema(1, imu::TYPE, "ros2msg", text.as_bytes());
                 }
-                let mut topic = known.name.to_owned();
-                if sample.sensor > 0 {
-                    topic = format!("{topic}/{}", sample.sensor);
-                }
-                if own != first {
-                    topic = format!("{}.{}/{topic}", own.0, own.1);
-                }
+                let topic = topic(known.name, sample.sensor, own, first);
                 let said = known.assumed().map(|unit| ("unit", unit));
                 to.channel(number, 1, &topic, "cdr", said.as_slice());
                 self.channels.entry(sender).or_insert((number, 0))
             }
         };
-        let time = found.time.saturating_mul(1000);
+        // A capture has no clock but the vehicle's.
+        let time = match self.is_bare {
+            true => sample.time,
+            false => found.time.saturating_mul(1000),
+        };
         let stamp = (sample.time, "vehicle");
         imu::imu(&mut self.message, stamp, sample.rate, Some(sample.force));
         to.message(*channel, *count, time, &self.message);
@@ -136,16 +167,36 @@ impl Transcriber {
 }
 
 /// Whether it is a frame: by its checksum, or because another follows, or nothing.
-fn is_believed(found: &Frame<'_>, ahead: &[u8]) -> bool {
+fn is_believed(found: &Frame<'_>, ahead: &[u8], stamp: usize) -> bool {
     let rest = ahead.get(found.total..).unwrap_or(&[]);
-    found.checked == Checked::Right || rest.is_empty() || is_log(rest)
+    found.checked == Checked::Right
+        || rest.is_empty()
+        || (begins(rest, stamp) && (stamp > 0 || follow(rest)))
+}
+
+/// Whether frames follow each other in a capture, as many as are believed; what is cut at the end counts.
+fn follow(mut rest: &[u8]) -> bool {
+    for _ in 0..CHAIN {
+        match frame(rest, 0) {
+            Ok(found) if found.checked == Checked::Right => return true,
+            Ok(found) if found.checked == Checked::Unknown => {
+                rest = rest.get(found.total..).unwrap_or(&[]);
+            }
+            Ok(_) | Err(None) => return false,
+            Err(Some(_)) => return true,
+        }
+        if rest.is_empty() {
+            return true;
+        }
+    }
+    true
 }
 
 /// Whether a frame begins in these bytes behind the first.
-fn has_frame(ahead: &[u8]) -> bool {
+fn has_frame(ahead: &[u8], stamp: usize) -> bool {
     (1..ahead.len()).any(|at| {
         let rest = ahead.get(at..).unwrap_or(&[]);
-        frame(rest).is_ok_and(|found| is_believed(&found, rest))
+        frame(rest, stamp).is_ok_and(|found| is_believed(&found, rest, stamp))
     })
 }
 

@@ -226,6 +226,11 @@ pub enum ProblemKind {
     },
     /// A message whose checksum is wrong (MAVLink).
     Checksum,
+    /// Frames that their sender has numbered, and that are not there (MAVLink).
+    FramesMissing {
+        /// Number of frames.
+        count: u64,
+    },
     /// A file beside a database says that a change of it was not ended.
     Journal,
     /// The summary at the end cannot be used; nothing is lost by that.
@@ -391,6 +396,9 @@ impl fmt::Display for ProblemKind {
                 write!(f, "telemetry that cannot be read: {why}; skipped")
             }
             ProblemKind::Checksum => write!(f, "the checksum of a message is wrong; skipped"),
+            ProblemKind::FramesMissing { count } => {
+                write!(f, "{count} frames that the sender has numbered are missing")
+            }
             ProblemKind::Journal => write!(
                 f,
                 "a file -journal beside the database says that it is in the middle of a change; `sqlite3 FILE .tables` puts it right"

@@ -44,12 +44,18 @@ impl Session {
     /// The next bytes of the stream, received at `received`. Not all of them may be worked on: see
     /// [`Session::is_held`].
     pub fn bytes(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
-        self.add(bytes, false, received, scratch);
+        match self.lines_of_link(bytes) {
+            Some(lines) => self.add(&lines, false, received, scratch),
+            None => self.add(bytes, false, received, scratch),
+        }
     }
 
     /// A datagram or message: its end ends its last line.
     pub fn message(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
-        self.add(bytes, true, received, scratch);
+        match self.lines_of_link(bytes) {
+            Some(lines) => self.add(&lines, true, received, scratch),
+            None => self.add(bytes, true, received, scratch),
+        }
     }
 
     /// The stream has ended: what is unfinished is a line.

@@ -55,7 +55,15 @@ fn scaled(n: u32) -> Vec<u8> {
 
 /// Messages and faults, pushed in pieces.
 fn read(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<ProblemKind>) {
-    let mut transcriber = Transcriber::default();
+    read_by(Transcriber::default(), log, piece)
+}
+
+/// The same of a log, or of a capture.
+fn read_by(
+    mut transcriber: Transcriber,
+    log: &[u8],
+    piece: usize,
+) -> (Vec<Vec<u8>>, Vec<ProblemKind>) {
     let mut to = Transcript::default();
     let (mut from, mut have) = (0, 0);
     while from < log.len() {
@@ -156,4 +164,138 @@ fn garbage_between_frames_and_a_cut_are_told() {
             "{cut}: {faults:?}"
         );
     }
+}
+
+/// Frame of a capture: without a time, with the number it has among those of its sender.
+fn bare(frame: &[u8], sequence: u8) -> Vec<u8> {
+    let mut frame = frame[8..].to_vec();
+    let (at, end) = match frame[0] {
+        0xfe => (2, frame.len() - 2),
+        _ => (4, frame.len() - 2 - 13 * usize::from(frame[2])),
+    };
+    frame[at] = sequence;
+    let extra = if frame[at + 3] == 116 { 76 } else { 93 };
+    let sum = checksum(&[&frame[1..end], &[extra]].concat());
+    frame[end..end + 2].copy_from_slice(&sum.to_le_bytes());
+    frame
+}
+
+/// Frame of a message that is not read, with another checksum than any that is.
+fn unread(sequence: u8) -> Vec<u8> {
+    let mut frame = framed(0, 2, 33, 104, &[5; 28])[8..].to_vec();
+    frame[4] = sequence;
+    frame
+}
+
+fn capture() -> Vec<Vec<u8>> {
+    let frame = |n: u8| match n % 5 {
+        0 => bare(&scaled(u32::from(n)), n),
+        4 => unread(n),
+        version => bare(&highres(u64::from(n), version), n),
+    };
+    (0..60).map(frame).collect()
+}
+
+#[test]
+fn a_capture_has_the_frames_of_a_link_in_any_cut_and_the_clock_of_the_vehicle() {
+    let log = capture().concat();
+    let (messages, faults) = read_by(Transcriber::of_capture(), &log, log.len());
+    assert_eq!((messages.len(), faults.len()), (48, 0), "{faults:?}");
+    for piece in [1, 7, 100, 301] {
+        let again = read_by(Transcriber::of_capture(), &log, piece);
+        assert_eq!(again, (messages.clone(), vec![]), "{piece}");
+    }
+    // Channel, number, and the time in ns: the second is HIGHRES_IMU at 1 ms.
+    let time = u64::from_le_bytes(*messages[1][6..].first_chunk().unwrap());
+    assert_eq!(time, 1_000_000);
+    // Joined within a frame.
+    let (late, faults) = read_by(Transcriber::of_capture(), &log[20..], 64);
+    assert_eq!(late.len(), 47);
+    assert!(
+        matches!(faults[..], [ProblemKind::Garbage { .. }]),
+        "{faults:?}"
+    );
+}
+
+#[test]
+fn frames_that_a_capture_lacks_are_counted_and_late_ones_are_not() {
+    let mut frames = capture();
+    frames.swap(30, 31);
+    drop(frames.drain(10..13));
+    let (_, faults) = read_by(Transcriber::of_capture(), &frames.concat(), 64);
+    // Of the two that changed places one was missing for a moment.
+    let missing = |count| ProblemKind::FramesMissing { count };
+    assert_eq!(faults, [missing(3), missing(1)]);
+    // 256 frames are a turn of the counter.
+    let turn: Vec<u8> = (0..700_u32)
+        .flat_map(|n| bare(&scaled(n), n as u8))
+        .collect();
+    let (messages, faults) = read_by(Transcriber::of_capture(), &turn, 1000);
+    assert_eq!((messages.len(), faults.len()), (700, 0));
+}
+
+#[test]
+fn a_capture_is_known_by_two_frames_and_nothing_else_is_taken_for_one() {
+    use super::super::frame::{is_capture, may_be_capture};
+    let log = capture().concat();
+    assert!(is_capture(&log) && is_capture(&log[..400]) && !is_capture(&log[1..]));
+    assert!(may_be_capture(&log[..60]) && !may_be_capture(&log));
+    // Of a vehicle whose first messages are none that are read.
+    let others: Vec<u8> = (0..9).flat_map(unread).collect();
+    assert!(is_capture(&others) && !is_capture(&[unread(1), unread(1)].concat().repeat(9)));
+    let mut noise = 1_u32;
+    let random: Vec<u8> = std::iter::repeat_with(|| {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (noise >> 24) as u8
+    })
+    .take(4096)
+    .collect();
+    for none in [
+        &b"t,gx,gy,gz\n0,1,2,3\n"[..],
+        &[0xfe; 4096],
+        &[0xfd; 4096],
+        &random,
+        &[],
+    ] {
+        assert!(!is_capture(none) && !(none.len() > 2000 && may_be_capture(none)));
+    }
+}
+
+#[test]
+fn a_living_link_gives_a_line_with_the_last_byte_of_each_frame() {
+    let frames = capture();
+    let mut link = super::super::Link::default();
+    let mut lines = Vec::new();
+    // Noise before it, and one frame that does not come.
+    link.push(&[0x55, 0xfe, 0x00, 0xfd], None, &mut lines);
+    for (n, frame) in frames.iter().enumerate().filter(|(n, _)| *n != 21) {
+        let before = lines.len();
+        for byte in frame {
+            assert_eq!(lines.len(), before, "{n}");
+            link.push(&[*byte], Some("mav"), &mut lines);
+        }
+        assert_eq!(lines.len() > before, n % 5 != 4, "{n}");
+    }
+    assert_eq!(link.counts(), (59, 1));
+    let text = String::from_utf8(lines).unwrap();
+    assert_eq!(
+        text.lines().next(),
+        Some(
+            "{\"id\":\"mav/SCALED_IMU2\",\"stamp\":{\"sec\":0,\"nsec\":0},\"gyro\":[0.01,0.02,-0.03],\"accel\":[9.80665,-0,9.80665]}"
+        )
+    );
+    assert_eq!(text.lines().count(), 47);
+}
+
+#[test]
+fn a_capture_is_known_in_a_file_and_in_a_stream() {
+    use crate::format::Format;
+    use crate::mcap::Reader;
+    let log = capture().concat();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("link.bytes");
+    std::fs::write(&path, &log).unwrap();
+    let file = Reader::open(&path).unwrap();
+    let stream = Reader::from_stream("link", Box::new(std::io::Cursor::new(log))).unwrap();
+    assert_eq!([file.format(), stream.format()], [Format::Mavlink; 2]);
 }
