@@ -52,7 +52,8 @@ fn sinks(subject: &str, besides: &str, rest: &str) -> String {
     format!(
         "{subject}{besides}, - (NDJSON on stdout), null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, \
          ws-listen://HOST:PORT (whoever connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who \
-         listens). {rest}May be given several times"
+         listens); opentrack://, osc://, vmc://, slimevr://, mavlink://HOST:PORT[?id=NAME&rate=HZ] (another program, in \
+         its protocol). {rest}May be given several times"
     )
 }
 

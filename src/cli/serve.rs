@@ -68,8 +68,9 @@ pub struct Serve {
     /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
     #[arg(long, value_name = "URI")]
     pub listen: Vec<String>,
-    /// Send every attitude there, too: tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler]. May be
-    /// given several times
+    /// Send every attitude there, too: tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler], or in the protocol of
+    /// another program opentrack://, osc://, vmc://, slimevr://, mavlink://HOST:PORT[?id=NAME&rate=HZ]. May be given
+    /// several times
     #[arg(short, long = "output", value_name = "SINK")]
     pub output: Vec<String>,
     /// Take what is not given as a flag or in the environment from this TOML file

@@ -27,6 +27,7 @@ mod layouts;
 mod model;
 #[cfg(unix)]
 mod next;
+mod other_programs;
 mod packed;
 #[cfg(unix)]
 mod pages;

@@ -28,6 +28,7 @@ mod limits;
 mod losses;
 mod opening;
 mod operations;
+mod other_programs;
 mod packaging;
 mod packed;
 mod places;

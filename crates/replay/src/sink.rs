@@ -10,20 +10,24 @@
 //! looks like is in the files below.
 
 pub mod address;
+mod axes;
 mod batch;
 mod claim;
 mod copy;
 mod csv;
+pub mod datagram;
 mod decimate;
 mod document;
 mod form;
 mod format;
+mod gcsv;
 pub mod json;
 mod mcap;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plot;
+mod poses;
 mod socket;
 mod stream;
 mod target;
@@ -33,9 +37,11 @@ mod text;
 mod tum;
 pub mod upload;
 
+pub use axes::roll_pitch_yaw;
 pub use claim::{claim_or_warn, unclaimed};
 pub use copy::CopiedChannel;
-pub use csv::{RAW_HEADER, push_raw_row, roll_pitch_yaw};
+pub use csv::{RAW_HEADER, push_raw_row};
+pub use datagram::{Datagrams, Recipient};
 pub use decimate::Decimator;
 pub use document::Document;
 pub use form::Precision;
@@ -177,6 +183,7 @@ impl Sink {
             options,
             profile: match target {
                 Target::Udp { profile, .. } => *profile,
+                Target::Protocol(_) => Profile::Records,
                 _ => Profile::Lines,
             },
             streams: &streams,

@@ -30,6 +30,7 @@ pub struct Channel {
     stream: Stream,
     lines: Objects,
     plot: Objects,
+    records: Objects,
     /// Number in packed objects, and the line that announces it.
     label: (u32, Bytes),
     /// Number of its first channel for viewers.
@@ -94,6 +95,7 @@ impl Channel {
             stream: stream.clone(),
             lines: Objects::new(stream, Profile::Lines),
             plot: Objects::new(stream, Profile::PlotJuggler),
+            records: Objects::new(stream, Profile::Records),
             label: (number, wire::packed_stream(number, stream)),
             number: frames::channel_of(number),
             payloads: Payloads::new(stream, &child),
@@ -269,6 +271,7 @@ impl Channel {
         match profile {
             Profile::Lines => &self.lines,
             Profile::PlotJuggler => &self.plot,
+            Profile::Records => &self.records,
         }
     }
 

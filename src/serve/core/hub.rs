@@ -308,7 +308,9 @@ impl Hub {
     pub fn join_as(&self, peer: impl Into<Peer>, shape: ClientProtocol) -> Arc<Client> {
         let outbox = match shape {
             ClientProtocol::Lines(Profile::Lines) => Outbox::new(),
-            ClientProtocol::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
+            ClientProtocol::Lines(Profile::PlotJuggler | Profile::Records) => {
+                Outbox::saying(|_, _| Bytes::new())
+            }
             #[cfg(feature = "zenoh")]
             ClientProtocol::Messages => Outbox::saying(|_, _| Bytes::new()),
             ClientProtocol::Foxglove { .. } => Outbox::saying(foxglove::gap),
@@ -589,7 +591,7 @@ impl Hub {
         text: &mut Vec<u8>,
     ) {
         // Encoded when the first asks, and shared by all.
-        let mut encoded: [Option<Vec<Chunk>>; 3] = [None, None, None];
+        let mut encoded: [Option<Vec<Chunk>>; 4] = [None, None, None, None];
         // Locked to the end: who comes late finds all of these in it, or is among the watchers.
         let mut last = channel.last();
         let before = last.map(|(_, sample)| sample.stamp);
@@ -622,12 +624,13 @@ impl Hub {
                     continue;
                 }
             };
-            let [lines, plot, packed] = &mut encoded;
+            let [lines, plot, records, packed] = &mut encoded;
             let mut shared = |form| {
                 let kept = match (form, profile) {
                     (Form::Packed, _) => &mut *packed,
                     (Form::Lines, Profile::Lines) => &mut *lines,
                     (Form::Lines, Profile::PlotJuggler) => &mut *plot,
+                    (Form::Lines, Profile::Records) => &mut *records,
                 };
                 kept.get_or_insert_with(|| channel.chunks(form, profile, first_seq, items, text))
                     .clone()

@@ -11,12 +11,13 @@ use crate::serve::brokers::nats::address::NatsAddress;
 #[cfg(feature = "zenoh")]
 use crate::serve::brokers::zenoh::address::ZenohAddress;
 use crate::sink::Target;
+use crate::sink::datagram::Protocol;
 use strapd_attitude::diagnostic::Diagnostic;
 
 /// Place to which every attitude is sent.
 #[derive(Clone, Debug)]
 pub enum Output {
-    /// Somebody who listens ([`Target::Tcp`], [`Target::Udp`]).
+    /// Somebody who listens ([`Target::Tcp`], [`Target::Udp`], [`Target::Protocol`]).
     Receiver(Target),
     /// Subjects of NATS.
     #[cfg(feature = "nats")]
@@ -45,10 +46,11 @@ impl Output {
             return Err(without_zenoh("-o", text));
         }
         match Target::parse(text)? {
-            target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(Output::Receiver(target)),
+            target @ (Target::Tcp(_) | Target::Udp { .. } | Target::Protocol(_)) => Ok(Output::Receiver(target)),
             _ => Err(Error::usage(
                 Diagnostic::new(format!(
-                    "-o {text}: the daemon sends to tcp://HOST:PORT and udp://HOST:PORT[?profile=plotjuggler]"
+                    "-o {text}: the daemon sends to tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler], {}",
+                    Protocol::addresses()
                 ))
                 .help("--listen waits for watchers, --record FILE.mcap writes a file"),
             )),

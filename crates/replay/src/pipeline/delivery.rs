@@ -48,6 +48,7 @@ fn name(target: &Target) -> String {
         Target::Listen(listen) => listen.to_string(),
         Target::Tcp(address) => format!("tcp://{address}"),
         Target::Udp { address, .. } => format!("udp://{address}"),
+        Target::Protocol(recipient) => recipient.to_string(),
     }
 }
 

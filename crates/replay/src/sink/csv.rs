@@ -2,6 +2,7 @@
 //!
 //! The names of the columns are those that [`strapd_recording::table`] reads.
 
+use super::axes::roll_pitch_yaw;
 use super::form::{Form, Opening, Slot};
 use super::stream::{Content, Stream};
 use super::text::{push_f64, push_i64, push_status};
@@ -111,44 +112,11 @@ fn push_number(out: &mut Vec<u8>, value: f64) {
     }
 }
 
-/// Roll, pitch, yaw in rad of the rotation Rz(yaw) Ry(pitch) Rx(roll), `q = [w, x, y, z]`.
-///
-/// # Accuracy
-/// A few 1e-16 rad everywhere, gimbal lock included: pitch comes from an arctangent of sums, not
-/// from an arcsine (which loses half the digits near 90 degrees). At pitch exactly +-90 degrees only
-/// the sum (or difference) of roll and yaw is defined, and they share it.
-///
-/// # Source
-/// Bernardes and Viollet, PLoS ONE 17 (2022), the half-angle form, derived here for ZYX: with half
-/// angles, `w - y = (cos - sin)(pitch/2) cos((yaw + roll)/2)` and so on for `x + z`, `w + y`, `z - x`.
-pub fn roll_pitch_yaw([w, x, y, z]: [f64; 4]) -> [f64; 3] {
-    let half_sum = (x + z).atan2(w - y);
-    let half_difference = (z - x).atan2(w + y);
-    let pitch =
-        2.0 * (w + y).hypot(z - x).atan2((w - y).hypot(x + z)) - std::f64::consts::FRAC_PI_2;
-    [
-        half_turn(half_sum - half_difference),
-        pitch,
-        half_turn(half_sum + half_difference),
-    ]
-}
-
-/// Into (-pi, pi]; the argument lies in [-2 pi, 2 pi].
-fn half_turn(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    if angle > PI {
-        angle - TAU
-    } else if angle <= -PI {
-        angle + TAU
-    } else {
-        angle
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::sink::axes::half_turn;
     use crate::sink::tests::sample;
     use nalgebra::{UnitQuaternion, Vector3};
     use strapd_attitude::record::{AttitudeCovariance, Nanos, Status};

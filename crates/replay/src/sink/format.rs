@@ -4,7 +4,7 @@
 //! and what a batch becomes is the business of the [`Form`] that the row opens.
 
 use super::form::{Form, Opening};
-use super::{csv, json, mcap, tum};
+use super::{csv, gcsv, json, mcap, poses, tum};
 use crate::error::Result;
 
 /// Format of a file or pipe.
@@ -18,6 +18,12 @@ pub enum Format {
     Csv,
     /// A trajectory as `evo` reads it.
     Tum,
+    /// Rates and forces for Gyroflow.
+    Gcsv,
+    /// Orientations of every sensor in rows for OpenSim.
+    Sto,
+    /// A motion of a flat skeleton, a joint for every sensor.
+    Bvh,
     /// A table in Parquet.
     Parquet,
     /// Format of this table's test.
@@ -87,6 +93,30 @@ const ROWS: &[Row] = &[
         takes_several: false,
         takes_samples: false,
         open: Some(tum::begin),
+        ..ANY
+    },
+    Row {
+        format: Format::Gcsv,
+        endings: &["gcsv"],
+        reader: Some("Gyroflow"),
+        takes_several: false,
+        open: Some(gcsv::begin),
+        ..ANY
+    },
+    Row {
+        format: Format::Sto,
+        endings: &["sto"],
+        reader: Some("OpenSim"),
+        takes_samples: false,
+        open: Some(poses::begin_sto),
+        ..ANY
+    },
+    Row {
+        format: Format::Bvh,
+        endings: &["bvh"],
+        reader: Some("animation"),
+        takes_samples: false,
+        open: Some(poses::begin_bvh),
         ..ANY
     },
     Row {

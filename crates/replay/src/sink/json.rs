@@ -4,6 +4,7 @@
 //! copies and ten floats. Floats are the shortest decimals that read back to the same bits.
 //! JSON has no NaN: what is not finite is `null`.
 
+use super::datagram::RecordObject;
 use super::form::{Form, Opening, Slot};
 use super::plot::PlotObject;
 use super::stream::{Content, Stream};
@@ -21,6 +22,8 @@ pub enum Profile {
     Lines,
     /// Form that PlotJuggler's UDP server reads with its JSON protocol.
     PlotJuggler,
+    /// Records that [`Datagrams`](super::Datagrams) makes datagrams of: attitudes alone, and no lines.
+    Records,
 }
 
 /// The lines of one stream.
@@ -32,6 +35,7 @@ enum Object {
     Att(AttObject),
     Rate(RateObject),
     Plot(PlotObject),
+    Record(RecordObject),
 }
 
 impl Objects {
@@ -40,6 +44,7 @@ impl Objects {
     pub fn new(stream: &Stream, profile: Profile) -> Objects {
         Objects(match (profile, stream.content) {
             (Profile::PlotJuggler, _) => Object::Plot(PlotObject::new(stream)),
+            (Profile::Records, _) => Object::Record(RecordObject::new(stream)),
             (Profile::Lines, Content::Attitude | Content::Truth) => {
                 Object::Att(AttObject::new(stream))
             }
@@ -52,6 +57,7 @@ impl Objects {
         match &self.0 {
             Object::Att(object) => object.push(out, seq, sample),
             Object::Plot(object) => object.push(out, sample),
+            Object::Record(object) => return object.push(out, sample),
             Object::Rate(_) => return,
         }
         out.push(b'\n');
@@ -62,7 +68,7 @@ impl Objects {
         match &self.0 {
             Object::Rate(object) => object.push(out, seq, sample),
             Object::Plot(object) => object.push_raw(out, sample),
-            Object::Att(_) => return,
+            Object::Att(_) | Object::Record(_) => return,
         }
         out.push(b'\n');
     }

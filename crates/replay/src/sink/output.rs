@@ -5,7 +5,7 @@
 //! given its name only when complete: a run that dies leaves no finished-looking file.
 
 use super::claim::{claim, is_busy, unclaimed};
-use super::socket::{Tcp, Udp};
+use super::socket::{Conversation, Tcp, Udp};
 use super::target::Target;
 use super::upload::Upload;
 use crate::error::{Error, Result};
@@ -48,6 +48,8 @@ pub(super) enum Output {
     Tcp(Tcp),
     /// Somebody who may listen.
     Udp(Udp),
+    /// Another program, in its own protocol.
+    Conversation(Conversation),
     /// Nowhere.
     Null,
 }
@@ -62,7 +64,10 @@ impl Output {
             // Who listens is served, not written to.
             Target::Null | Target::Listen(_) => Ok(Output::Null),
             Target::Tcp(address) => Tcp::connect(address).map(Output::Tcp),
-            Target::Udp { address, .. } => Udp::to(address).map(Output::Udp),
+            Target::Udp { address, .. } => {
+                Udp::to(&format!("udp://{address}"), address).map(Output::Udp)
+            }
+            Target::Protocol(recipient) => Conversation::with(recipient).map(Output::Conversation),
             Target::Stdout => Ok(Output::Stdout(io::stdout())),
             Target::File { path, .. } => Output::file(path, inputs, force),
             Target::Store { address, .. } => Upload::begin(address, force).map(Output::Upload),
@@ -127,13 +132,20 @@ impl Output {
             Output::Part(part) => Some(&part.shown),
             Output::Direct { path, .. } => Some(path),
             Output::Upload(upload) => Some(&upload.shown),
-            Output::Stdout(_) | Output::Tcp(_) | Output::Udp(_) | Output::Null => None,
+            Output::Stdout(_)
+            | Output::Tcp(_)
+            | Output::Udp(_)
+            | Output::Conversation(_)
+            | Output::Null => None,
         }
     }
 
     /// Whether it is a connection to somebody.
     pub(super) fn is_socket(&self) -> bool {
-        matches!(self, Output::Tcp(_) | Output::Udp(_))
+        matches!(
+            self,
+            Output::Tcp(_) | Output::Udp(_) | Output::Conversation(_)
+        )
     }
 
     /// Hands all of `bytes` over.
@@ -148,6 +160,7 @@ impl Output {
             Output::Stdout(stdout) => stdout.write_all(bytes),
             Output::Tcp(tcp) => tcp.write(bytes),
             Output::Udp(udp) => udp.write(bytes),
+            Output::Conversation(talk) => talk.write(bytes),
             Output::Null => Ok(()),
         };
         self.judge(result)
@@ -177,6 +190,7 @@ impl Output {
             Output::Upload(upload) => upload.finish()?,
             Output::Tcp(tcp) => tcp.finish(),
             Output::Udp(udp) => udp.finish(),
+            Output::Conversation(talk) => talk.finish(),
             Output::Direct { .. } | Output::Stdout(_) | Output::Null => {}
         }
         Ok(flow)
@@ -186,6 +200,7 @@ impl Output {
         let socket = match self {
             Output::Tcp(tcp) => Some(tcp.name()),
             Output::Udp(udp) => Some(udp.name()),
+            Output::Conversation(talk) => Some(talk.name()),
             _ => None,
         };
         if let (Some(name), Err(why)) = (socket, &result) {

@@ -1,13 +1,14 @@
-//! Lines -> somebody who listens on a socket. I/O.
+//! Lines, or datagrams of another program's protocol -> somebody who listens on a socket. I/O.
 //!
 //! Over TCP a slow reader slows the run down, as a pipe does; over UDP nobody is waited for. Either is
 //! a sink of its own: when it fails it is said and that sink ends, the others go on.
 
+use super::datagram::{Datagrams, Recipient};
 use crate::error::{Error, Result};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time that a connection may take to come about.
 const CONNECT: Duration = Duration::from_secs(10);
@@ -148,12 +149,12 @@ pub(super) struct Udp {
 }
 
 impl Udp {
-    /// Sends to `HOST:PORT`.
+    /// Sends to `HOST:PORT`, called `name` in messages.
     ///
     /// # Errors
     /// [`Error::Connect`]: there is no such place.
-    pub(super) fn to(address: &str) -> Result<Udp> {
-        let name = format!("udp://{address}");
+    pub(super) fn to(name: &str, address: &str) -> Result<Udp> {
+        let name = name.to_owned();
         let place = resolve(&name, address)?.into_iter().next();
         let place = place.ok_or_else(|| connecting(&name, ErrorKind::NotFound.into()))?;
         let own: SocketAddr = match place {
@@ -176,15 +177,20 @@ impl Udp {
 
     /// One datagram for each line.
     pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        for line in bytes.split_inclusive(|b| *b == b'\n') {
-            match self.socket.send(line) {
-                Ok(_) => {}
-                // The answer to an earlier one: nobody listens, yet.
-                Err(why) if why.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
-                Err(why) => return Err(why),
+        let mut lines = bytes.split_inclusive(|b| *b == b'\n');
+        lines.try_for_each(|line| self.send(line))
+    }
+
+    fn send(&mut self, datagram: &[u8]) -> io::Result<()> {
+        match self.socket.send(datagram) {
+            Ok(_) => Ok(()),
+            // The answer to an earlier one: nobody listens, yet.
+            Err(why) if why.kind() == ErrorKind::ConnectionRefused => {
+                self.refused += 1;
+                Ok(())
             }
+            Err(why) => Err(why),
         }
-        Ok(())
     }
 
     /// Everything was written.
@@ -196,5 +202,70 @@ impl Udp {
                 self.refused
             );
         }
+    }
+}
+
+/// Datagrams to another program, and what it answers.
+#[derive(Debug)]
+pub(super) struct Conversation {
+    udp: Udp,
+    datagrams: Datagrams,
+    /// Whether answers are read, and signs of life sent.
+    converses: bool,
+}
+
+impl Conversation {
+    /// Begins to send there.
+    ///
+    /// # Errors
+    /// [`Error::Connect`]: there is no such place.
+    pub(super) fn with(recipient: &Recipient) -> Result<Conversation> {
+        let name = recipient.to_string();
+        let udp = Udp::to(&name, &recipient.address)?;
+        Ok(Conversation {
+            udp,
+            datagrams: Datagrams::new(recipient),
+            converses: recipient.converses(),
+        })
+    }
+
+    pub(super) fn name(&self) -> &str {
+        self.udp.name()
+    }
+
+    /// Sends what records, time and answers ask for.
+    pub(super) fn write(&mut self, records: &[u8]) -> io::Result<()> {
+        if self.converses {
+            self.hear()?;
+            self.datagrams.tick(Instant::now());
+        }
+        self.datagrams.take(records);
+        while let Some(datagram) = self.datagrams.ready() {
+            self.udp.send(&datagram)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the answers that are there, and waits for none.
+    fn hear(&mut self) -> io::Result<()> {
+        let mut said = [0; 1500];
+        self.udp.socket.set_nonblocking(true)?;
+        // What cannot be received says that nobody listens, which is counted where it is sent.
+        while let Ok(length) = self.udp.socket.recv(&mut said) {
+            let said = said.get(..length).unwrap_or(&[]);
+            self.datagrams.hear(said, Instant::now());
+        }
+        self.udp.socket.set_nonblocking(false)
+    }
+
+    /// Everything was written.
+    pub(super) fn finish(mut self) {
+        if self.converses
+            && self.hear().is_ok()
+            && let Some(words) = self.datagrams.unanswered()
+        {
+            tracing::warn!("{words}");
+        }
+        self.udp.finish();
     }
 }

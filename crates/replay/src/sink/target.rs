@@ -1,5 +1,6 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
+use super::datagram::{Protocol, Recipient};
 use super::format::Format;
 use super::json::Profile;
 use crate::address::Address;
@@ -43,13 +44,16 @@ pub enum Target {
         /// Form of the objects.
         profile: Profile,
     },
+    /// Datagrams of a protocol that another program speaks, whether or not it listens.
+    Protocol(Recipient),
 }
 
 /// The list every message about an unknown sink ends with.
 fn known() -> String {
     let files = Format::files();
     format!(
-        "known sinks: {files}, s3://BUCKET/KEY, gs://BUCKET/KEY, az://CONTAINER/KEY with such an ending (with the feature object-store), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)"
+        "known sinks: {files}, s3://BUCKET/KEY, gs://BUCKET/KEY, az://CONTAINER/KEY with such an ending (with the feature object-store), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens), {}",
+        Protocol::addresses()
     )
 }
 
@@ -90,6 +94,8 @@ impl Target {
         let is_complete = address.rsplit_once(':').is_some_and(|(host, port)| {
             !host.is_empty() && port.parse::<u16>().is_ok_and(|p| p > 0)
         });
+        let recipient = Recipient::parse(scheme, address, query);
+        let is_sent_to = matches!(scheme, "tcp" | "udp") || recipient.is_some();
         match (scheme, query) {
             ("tcp-listen" | "unix-listen" | "ws-listen", None) => {
                 Listen::parse_from("-o", text).map(Target::Listen)
@@ -100,10 +106,10 @@ impl Target {
             ("udp-listen", _) => refuse(&format!(
                 "takes samples in (strapd serve {LISTEN}); udp://HOST:PORT sends"
             )),
-            ("tcp" | "udp", _) if address.contains('@') => refuse(&format!(
+            (_, _) if is_sent_to && address.contains('@') => refuse(&format!(
                 "no user or password goes into an address; strapd serve {TOKEN_FILE} shows a token"
             )),
-            ("tcp" | "udp", _) if !is_complete => refuse("HOST:PORT is needed"),
+            (_, _) if is_sent_to && !is_complete => refuse("HOST:PORT is needed"),
             ("tcp", None) => Ok(Target::Tcp(address.to_owned())),
             ("udp", query) => {
                 let profile = match query {
@@ -118,7 +124,11 @@ impl Target {
             _ if SCHEMES.contains(&scheme) => refuse(
                 "web servers are read, not written to: none says whether what came is whole. Write a file, and bring it there (curl -T FILE ADDRESS), or an object of a store (s3://, gs://, az://)",
             ),
-            _ => refuse(&format!("unknown scheme `{scheme}`")),
+            _ => match recipient {
+                Some(Ok(recipient)) => Ok(Target::Protocol(recipient)),
+                Some(Err(why)) => refuse(&why),
+                None => refuse(&format!("unknown scheme `{scheme}`")),
+            },
         }
     }
 
@@ -206,7 +216,9 @@ impl Target {
     pub fn format(&self) -> Option<Format> {
         match self {
             Target::File { format, .. } | Target::Store { format, .. } => Some(*format),
-            Target::Stdout | Target::Tcp(_) | Target::Udp { .. } => Some(Format::Ndjson),
+            Target::Stdout | Target::Tcp(_) | Target::Udp { .. } | Target::Protocol(_) => {
+                Some(Format::Ndjson)
+            }
             Target::Null | Target::Listen(_) => None,
         }
     }
