@@ -44,6 +44,7 @@ mod frozen;
 mod gate;
 mod histogram;
 mod memory;
+mod mixture;
 mod order;
 pub(crate) mod rails;
 mod repairs;
@@ -52,6 +53,7 @@ mod settings;
 mod spacing;
 mod spikes;
 mod timing;
+mod unit_change;
 
 pub mod quality;
 pub mod regularise;
@@ -66,18 +68,22 @@ pub use clock::{
 };
 pub use histogram::Histogram;
 pub use memory::Memory;
+pub use mixture::{Apart, Mixture};
 pub use repairs::{SpikePolicy, StampRepair};
 pub use report::{ClockSet, FirstBad, GAPS_KEPT, Gap, Gaps, Report, Wraps};
 pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};
 pub use settings::{OnGap, Settings, SettingsError};
 pub use spikes::SpikeCount;
+pub use unit_change::{UnitChange, UnitChanges};
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
 use clock::{BatchLearner, BatchLine, ClockSteps, IndexClock, Turns};
 use gate::{Gate, MAX_STAMP};
+use mixture::MixtureWatch;
 use order::Order;
 use spikes::Spikes;
 use timing::Timing;
+use unit_change::UnitWatch;
 
 /// Entries from which the ordinary step is learnt before the first sample leaves (recordings).
 const PRIMING: usize = 32;
@@ -115,6 +121,10 @@ pub struct Conditioner {
     batch_learner: Option<BatchLearner>,
     /// Looks for spikes in the samples that have left, where none waits for its successors.
     passed: Option<spikes::Passed>,
+    /// Look for two sensors in one stream, and for units that change; whether values are rates.
+    mixture: MixtureWatch,
+    units: UnitWatch,
+    is_rate: bool,
     /// A first sample with stamp zero, until the second tells whether that can be.
     zero: Option<(RawSample, u64)>,
     state: State,
@@ -185,6 +195,9 @@ impl Conditioner {
             primed: batch_line.is_some() || settings.coarse.is_some(),
             batch_learner: (is_live && batch_line.is_none()).then(BatchLearner::default),
             passed: spikes::Passed::of(settings),
+            mixture: MixtureWatch::new(is_rate),
+            units: UnitWatch::default(),
+            is_rate,
             batch_line,
             finishing: false,
             trim: (settings.start.is_some() || settings.until.is_some()).then(|| {
@@ -256,6 +269,7 @@ impl Conditioner {
         };
         match stamp {
             Some(stamp) if stamp.0.unsigned_abs() <= MAX_STAMP as u64 => {
+                self.mixture.take_stamp(stamp, &mut self.report.mixture);
                 let stamp = match self.is_followed {
                     true => self.followed(stamp),
                     false => stamp,
@@ -294,6 +308,9 @@ impl Conditioner {
                 if raw.accel.is_some() && gate::finite_accel(&entry.accel).is_none() {
                     self.report.accel_dropped += 1;
                 }
+                self.mixture.take(&entry, &mut self.report.mixture);
+                self.units
+                    .take(&entry, self.is_rate, &mut self.report.unit_changes);
                 if let Some(learner) = &mut self.batch_learner
                     && let Some(rate) = learner.push(entry.stamp.0, entry.value.into())
                 {

@@ -10,6 +10,7 @@ mod orientation;
 mod run;
 mod samples;
 mod sensors;
+mod stream;
 mod verdicts;
 
 pub use live::{LiveFindings, SensorWatch, is_of_gyro, says};
@@ -17,6 +18,7 @@ pub use run::of_sensor;
 pub(crate) use run::{Noted, of_run};
 pub use samples::of_samples;
 use strapd_attitude::setting::{AID, FIELD, TOPIC};
+pub(crate) use stream::find as of_stream;
 
 pub use crate::finding::{Finding, Severity};
 
@@ -150,6 +152,7 @@ fn of_run_and_samples(topic: &CheckedTopic) -> Vec<Finding> {
         ..finding
     }));
     sensors::settle(&mut found);
+    stream::settle(&mut found);
     if summary.aided.is_some() {
         found.iter_mut().for_each(samples::follow_bias);
     }

@@ -76,7 +76,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 14] = [
+const FAULTS: [Fault; 17] = [
     ("good", |_, _| {}, "", ""),
     (
         "reversed",
@@ -159,6 +159,37 @@ const FAULTS: [Fault; 14] = [
         "",
     ),
     ("no field", |_, s| s.mag = [0.0; 3], "field-empty", ""),
+    (
+        "degrees half way",
+        |n, s| {
+            if n >= 1100 {
+                s.gyro = s.gyro.map(f64::to_degrees)
+            }
+        },
+        "gyro-unit-change",
+        "",
+    ),
+    (
+        "g half way",
+        |n, s| {
+            if n >= 1100 {
+                s.accel = s.accel.map(|v| v / 9.81)
+            }
+        },
+        "accel-unit-change",
+        "",
+    ),
+    (
+        "two",
+        |n, s| {
+            if n % 2 == 1 {
+                s.accel = [s.accel[2], s.accel[0], s.accel[1]];
+                s.gyro = [s.gyro[2], s.gyro[0], s.gyro[1]];
+            }
+        },
+        "two-sensors",
+        "",
+    ),
 ];
 
 fn faulty(fault: fn(usize, &mut Sample)) -> Vec<Sample> {

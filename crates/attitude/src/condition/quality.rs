@@ -18,7 +18,7 @@ use super::rails::Rails;
 use super::regularise::{Lines, Uneven};
 use super::report::Wraps;
 use crate::record::{Nanos, RawSample};
-use gravity::GravityTrack;
+pub(super) use gravity::GravityTrack;
 use nalgebra::Vector3;
 use summary::{Axis, Offset};
 

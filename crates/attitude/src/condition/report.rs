@@ -4,7 +4,9 @@
 //! bounded memory, with the first case of each kind kept so that a message can point at it.
 
 use super::clock::{BatchRate, Period};
+use super::mixture::Mixture;
 use super::spikes::SpikeCount;
+use super::unit_change::UnitChanges;
 use crate::record::{Counts, Join, Nanos, Verdict};
 
 /// Number of gaps kept one by one; all are counted.
@@ -131,6 +133,10 @@ pub struct Report {
     pub spikes: SpikeCount,
     /// Spikes that had left when what came behind them showed them: of a stream that waits for nothing.
     pub spikes_left: SpikeCount,
+    /// Two sensors that take turns in the stream; `None` where there is one.
+    pub mixture: Option<Mixture>,
+    /// Units that changed on the way.
+    pub unit_changes: UnitChanges,
     /// The ordinary spacing, nanoseconds; `None` until two samples were used.
     pub spacing_nanos: Option<i64>,
     /// The step of the clock, nanoseconds, where it is coarser than the sensor's: its samples were spread

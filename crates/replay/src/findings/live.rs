@@ -4,7 +4,7 @@
 //! memory, and what was once certain is certain from then on.
 
 use super::samples::{self, Seen};
-use super::{Finding, Severity, magnetometer, run, sensors};
+use super::{Finding, Severity, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::Quality;
@@ -14,7 +14,7 @@ use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 9] = [
+const LASTING: [&str; 12] = [
     "gyro-axes",
     "gyro-scale",
     "gyro-against-gravity",
@@ -24,6 +24,9 @@ const LASTING: [&str; 9] = [
     "stuck",
     "field-frozen",
     "field-empty",
+    stream::MIXED,
+    stream::GYRO_UNIT_CHANGE,
+    stream::ACCEL_UNIT_CHANGE,
 ];
 /// Codes of those about gyro and gravity.
 const OF_GYRO: [&str; 3] = ["gyro-axes", "gyro-scale", "gyro-against-gravity"];
@@ -206,6 +209,8 @@ impl SensorWatch {
             }
             now.extend(self.of_field.clone());
         }
+        now.extend(stream::find(estimator.conditioning(), true));
+        stream::settle(&mut now);
         let lasting = now.iter().filter(|f| LASTING.contains(&f.code));
         let lasting = lasting.cloned().collect();
         sensors::settle(&mut now);

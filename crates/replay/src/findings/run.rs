@@ -1,6 +1,6 @@
 //! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
-use super::{Finding, Severity, magnetometer, orientation, samples, sensors};
+use super::{Finding, Severity, magnetometer, orientation, samples, sensors, stream};
 use crate::summary::aid::Frozen;
 use crate::summary::clocks::{clock_was_set, counter_wraps};
 use crate::summary::{Gaps, TopicSummary, significant};
@@ -119,6 +119,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             .help([TIME.to("index"), RATE_HZ.to("HZ")]),
         );
     }
+    out.extend(stream::find(noted.conditioning, false));
     out.extend(saturated(noted.conditioning));
     out.extend(spikes(noted.conditioning));
     if let Some(references) = noted.references.filter(|_| summary.against.is_empty()) {
@@ -134,6 +135,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         out.extend(magnetometer::finding(field, plan));
     }
     sensors::settle(&mut out);
+    stream::settle(&mut out);
     out
 }
 

@@ -8,7 +8,7 @@ use super::request::ReplayRequest;
 use super::session::{Topic, TopicInfo};
 use super::summarise;
 use crate::error::Error;
-use crate::findings::of_sensor;
+use crate::findings::{of_sensor, of_stream};
 use crate::summary::TopicSummary;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -152,6 +152,7 @@ pub fn so_far(
     let (report, propagation) = (estimator.conditioning(), estimator.propagation());
     let found = of_sensor(report, &propagation, &summary.clock);
     summary.findings.extend(found);
+    summary.findings.extend(of_stream(report, true));
     for finding in &mut summary.findings {
         finding.topic.clone_from(&summary.topic);
     }

@@ -16,6 +16,9 @@ const MEDIAN_STEP: f64 = 0.005;
 /// A window whose magnitude is off by more, or varies by more, reads more than gravity.
 const MAX_EXCESS: f64 = 0.05;
 const MAX_SPREAD: f64 = 0.1;
+/// The same where a ratio is compared with another of the same motion.
+const LOOSE_EXCESS: f64 = 0.25;
+const LOOSE_SPREAD: f64 = 0.3;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
@@ -30,8 +33,9 @@ struct Mean {
 
 /// Streaming least squares of the turn of gravity against what the gyro predicts.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct GravityTrack {
+pub(in crate::condition) struct GravityTrack {
     mean: Mean,
+    is_loose: bool,
     /// Running median of the windows' magnitudes: one g, in whatever unit.
     gravity: f64,
     /// Middle (ns), mean rate, direction of the window before.
@@ -39,6 +43,17 @@ pub(super) struct GravityTrack {
     seen_predicted: f64,
     predicted: f64,
     seen: f64,
+}
+
+/// Rotation of gravity from one window to the next.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::condition) struct GravityRotation {
+    /// Stamp with which the first of the two windows begins.
+    pub(in crate::condition) from: Nanos,
+    /// Change of gravity's direction.
+    pub(in crate::condition) seen: Vector3<f64>,
+    /// Change by the rates of the gyro.
+    pub(in crate::condition) by_gyro: Vector3<f64>,
 }
 
 /// Agreement of the gyro with the rotation of gravity.
@@ -51,7 +66,22 @@ pub struct GyroAgainstGravity {
 }
 
 impl GravityTrack {
-    pub(super) fn push(&mut self, stamp: Nanos, gyro: &Vector3<f64>, accel: &Vector3<f64>) {
+    /// Track that leaves out fewer windows of accelerated motion.
+    pub(in crate::condition) fn loose() -> GravityTrack {
+        GravityTrack {
+            is_loose: true,
+            ..GravityTrack::default()
+        }
+    }
+
+    /// Takes the next sample; returns what a window that ends with it adds.
+    #[inline]
+    pub(in crate::condition) fn push(
+        &mut self,
+        stamp: Nanos,
+        gyro: &Vector3<f64>,
+        accel: &Vector3<f64>,
+    ) -> Option<GravityRotation> {
         if self.mean.n == 0 {
             self.mean.start = stamp.0;
         }
@@ -63,19 +93,18 @@ impl GravityTrack {
                 before: None,
                 ..*self
             };
-            return;
+            return None;
         }
         self.mean.n += 1;
         self.mean.time += after as f64;
         self.mean.gyro += gyro;
         self.mean.accel += accel;
         self.mean.accel_squared += accel.norm_squared();
-        if after >= WINDOW_NANOS && self.mean.n >= WINDOW_SAMPLES {
-            self.close();
-        }
+        let is_full = after >= WINDOW_NANOS && self.mean.n >= WINDOW_SAMPLES;
+        is_full.then(|| self.close()).flatten()
     }
 
-    fn close(&mut self) {
+    fn close(&mut self) -> Option<GravityRotation> {
         let mean = std::mem::take(&mut self.mean);
         let n = f64::from(mean.n);
         let middle = mean.time / n;
@@ -83,7 +112,7 @@ impl GravityTrack {
         let norm = mean.accel.norm();
         if !(norm > 0.0 && norm.is_finite()) {
             self.before = None;
-            return;
+            return None;
         }
         let magnitude = norm / n;
         if self.gravity == 0.0 {
@@ -97,12 +126,16 @@ impl GravityTrack {
         let spread = (mean.accel_squared / n - magnitude * magnitude)
             .max(0.0)
             .sqrt();
-        if (magnitude / self.gravity - 1.0).abs() > MAX_EXCESS || spread > MAX_SPREAD * self.gravity
-        {
+        let (excess, most) = match self.is_loose {
+            true => (LOOSE_EXCESS, LOOSE_SPREAD),
+            false => (MAX_EXCESS, MAX_SPREAD),
+        };
+        if (magnitude / self.gravity - 1.0).abs() > excess || spread > most * self.gravity {
             self.before = None;
-            return;
+            return None;
         }
         let up = mean.accel / norm;
+        let mut rotation = None;
         if let Some((middle_before, start_before, rate_before, up_before)) = self.before {
             let apart = mean.start.saturating_sub(start_before) as f64 + middle - middle_before;
             if apart > 0.0 && apart < 3.0 * WINDOW_NANOS as f64 {
@@ -113,9 +146,15 @@ impl GravityTrack {
                 self.seen_predicted += seen.dot(&predicted);
                 self.predicted += predicted.norm_squared();
                 self.seen += seen.norm_squared();
+                rotation = Some(GravityRotation {
+                    from: Nanos(start_before),
+                    seen,
+                    by_gyro: predicted,
+                });
             }
         }
         self.before = Some((middle, mean.start, rate, up));
+        rotation
     }
 
     /// `None` while gravity has not turned by enough to tell.

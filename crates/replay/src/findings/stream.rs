@@ -1,0 +1,162 @@
+//! What a stream shows to be no single sensor in one unit -> findings: two that take turns, a unit that changes. Pure.
+//!
+//! Apart from the counts of a run because the advice depends on who reads it: a recording is split, a sender is mended.
+
+use super::{Finding, Severity};
+use crate::summary::significant;
+use strapd_attitude::condition::{Apart, Mixture, Report, UnitChange};
+use strapd_attitude::record::Nanos;
+use strapd_attitude::setting::{COLUMNS, GYRO_UNIT, START, TOPIC, UNTIL, WHERE};
+
+/// Codes of the findings here.
+pub(super) const MIXED: &str = "two-sensors";
+pub(super) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
+pub(super) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
+/// Findings about gyro and gravity that these explain.
+const EXPLAINED: [&str; 6] = [
+    "gyro-axes",
+    "gyro-scale",
+    "gyro-against-gravity",
+    "mag-axes",
+    "unit-against-gravity",
+    "unit-degrees",
+];
+/// Ratio of two units by which readings change, less 1.
+const NEAR: f64 = 0.15;
+/// Units of an accelerometer by their ratio, the larger readings first.
+const FORCES: [(f64, &str, &str); 3] = [
+    (9.806_65, "m/s^2", "g"),
+    (1000.0, "mg", "g"),
+    (1000.0 / 9.806_65, "mg", "m/s^2"),
+];
+/// The same of a gyro.
+const RATES: [(f64, &str, &str); 3] = [
+    (180.0 / std::f64::consts::PI, "deg/s", "rad/s"),
+    (1000.0, "mrad/s", "rad/s"),
+    (1000.0 * std::f64::consts::PI / 180.0, "mrad/s", "deg/s"),
+];
+
+/// Findings from the report of a stream: of a recording, or live.
+pub(crate) fn find(report: &Report, is_live: bool) -> Vec<Finding> {
+    let since = |at: Nanos| report.first.map_or(0.0, |first| at.secs_since(first));
+    let mixed = report.mixture.map(|found| mixed(&found, is_live, since));
+    let changes = report.unit_changes;
+    let gyro = changes.gyro.map(|change| {
+        let at = since(change.at);
+        let found = changed((&change, at), ("gyro", GYRO_UNIT_CHANGE), &RATES);
+        advised(found, (&change, at), is_live)
+    });
+    let accel = changes.accel.map(|change| {
+        let at = since(change.at);
+        let found = changed((&change, at), ("accelerometer", ACCEL_UNIT_CHANGE), &FORCES);
+        advised(found, (&change, at), is_live)
+    });
+    mixed.into_iter().chain(gyro).chain(accel).collect()
+}
+
+/// Leaves out what two sensors, or a change of the gyro's unit, explain.
+pub(super) fn settle(found: &mut Vec<Finding>) {
+    let is_cause = |f: &Finding| [MIXED, GYRO_UNIT_CHANGE].contains(&f.code);
+    if found.iter().any(is_cause) {
+        found.retain(|f| !EXPLAINED.contains(&f.code));
+    }
+}
+
+fn mixed(found: &Mixture, is_live: bool, since: impl Fn(Nanos) -> f64) -> Finding {
+    let n = found.samples;
+    let (what, key, value) = match found.apart {
+        Apart::Forces(angle) => {
+            let deg = angle.to_degrees();
+            let what = format!(
+                "the accelerations of {n} samples jump back and forth between two directions {deg:.0} deg apart"
+            );
+            (what, "apart_deg", deg)
+        }
+        Apart::Rates(apart) => {
+            let shown = significant(apart, 2);
+            let what = format!(
+                "the rates of {n} samples jump back and forth between two that are {shown} rad/s apart"
+            );
+            (what, "apart_rad_s", apart)
+        }
+        Apart::Clocks(apart) => {
+            let secs = apart as f64 * 1e-9;
+            let what = format!(
+                "the stamps jump {n} times back and forth between two clocks {} s apart",
+                significant(secs, 3)
+            );
+            (what, "apart_s", secs)
+        }
+    };
+    let finding = Finding::new(
+        Severity::Error,
+        MIXED,
+        format!("two sensors take turns in one stream: {what}"),
+    )
+    .with("samples", n)
+    .with(key, value);
+    if is_live {
+        return finding
+            .advise("the attitude is that of neither: give each sensor an id of its own");
+    }
+    let at = since(found.first);
+    let finding = match found.apart {
+        Apart::Clocks(_) => finding,
+        _ => finding.with("first_at_s", at),
+    };
+    finding
+        .advise("the attitude is that of neither: record each on a topic of its own, or with a column that names the sensor, and choose one")
+        .help([WHERE.to("COLUMN=VALUE")])
+        .help([COLUMNS.to("sensor=NAME")])
+        .help([TOPIC.to("NAME")])
+}
+
+fn changed(
+    (change, at): (&UnitChange, f64),
+    (sensor, code): (&str, &'static str),
+    units: &[(f64, &str, &str)],
+) -> Finding {
+    let factor = change.factor;
+    let is_near = |ratio: f64| (factor / ratio - 1.0).abs() < NEAR;
+    let named = units.iter().find_map(|(ratio, larger, smaller)| {
+        match (is_near(*ratio), is_near(1.0 / ratio)) {
+            (true, _) => Some(format!("its unit changes from {smaller} to {larger}")),
+            (_, true) => Some(format!("its unit changes from {larger} to {smaller}")),
+            _ => None,
+        }
+    });
+    let named = named.unwrap_or_else(|| "its range or scale changes".to_owned());
+    let by = match code {
+        ACCEL_UNIT_CHANGE => "gravity's length becomes",
+        _ => "against the rotation of gravity its rates become",
+    };
+    Finding::new(
+        Severity::Error,
+        code,
+        format!(
+            "the {sensor} reads otherwise from {at:.1} s after the start on: {by} {} of what it was, {named}",
+            significant(factor, 3)
+        ),
+    )
+    .with("at_s", at)
+    .with("factor", factor)
+}
+
+fn advised(found: Finding, (change, at): (&UnitChange, f64), is_live: bool) -> Finding {
+    if is_live {
+        return found.advise("the attitude is wrong after it: mend the sender, which was restarted with other settings, and reset the attitude");
+    }
+    let (before, behind) = (
+        format!("{:.1}", (at - 0.2).max(0.0)),
+        format!("{:.1}", at + 0.5),
+    );
+    let found =
+        found.advise("the attitude is wrong after it: take each part by itself, with its own unit");
+    let is_gyro = found.code == GYRO_UNIT_CHANGE;
+    let (before, behind) = (UNTIL.to(before), START.to(behind));
+    match change.is_first_right.filter(|_| is_gyro) {
+        None => found.help([before]).help([behind]),
+        Some(true) => found.help([before]).help([behind, GYRO_UNIT.to("UNIT")]),
+        Some(false) => found.help([before, GYRO_UNIT.to("UNIT")]).help([behind]),
+    }
+}
