@@ -125,6 +125,12 @@ impl Live {
                     .help("estimate(.., smooth=True), of samples that are all there"),
             ));
         }
+        if plan.mend {
+            return Err(argument(
+                Diagnostic::new("mend: what a recording tells as a whole, a live stream cannot")
+                    .help("estimate(.., mend=True), of samples that are all there"),
+            ));
+        }
         Ok(Live {
             meaning: Meaning::new(&plan, &Declared::default()),
             plan,

@@ -85,7 +85,7 @@ fn one(
 ) -> Result<(String, Outcome)> {
     let input = opening::open(file)?;
     let checked = examine(&input, asked, pool, &mut |_| {})?;
-    let found = FindingRow::all(&checked, &asked.plan);
+    let found = FindingRow::all(&checked, &checked.plan);
     let open = found.iter().filter(|row| row.answered.is_none());
     let worst = open.map(|row| row.finding.severity).max();
     let text = if global.json {

@@ -222,7 +222,7 @@ impl Report {
                 (None, "") => String::new(),
                 (None, topic) => format!("the orientation on {topic}"),
             },
-            findings: FindingRow::all(&checked, &asked.plan),
+            findings: FindingRow::all(&checked, &checked.plan),
             noise: checked
                 .topics
                 .iter()

@@ -5,6 +5,7 @@ mod faults;
 mod forces_elsewhere;
 mod judged;
 mod many;
+mod mixed;
 mod orientation;
 mod recordings;
 

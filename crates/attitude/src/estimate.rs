@@ -54,8 +54,8 @@ pub use memory::Memory;
 pub use noise_figures::{NOISE_FIGURES, NoiseFigure};
 pub use orientation_lag::LagPass;
 pub use plan::{
-    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, NOISE_PRESETS, Noise, NoisePreset,
-    Truncation,
+    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, Mended, NOISE_PRESETS, Noise,
+    NoisePreset, Truncation,
 };
 pub use pooled::Pooled;
 pub use preparation::{Patience, Preparation, Prepared, at_once};

@@ -173,6 +173,7 @@ settings! {
     MAG_MOUNT = "mag_mount";
     MAG_TOPIC = "mag_topic";
     MAX_GAP = "max_gap";
+    MEND = "mend";
     METHOD = "method";
     MOUNT = "mount";
     NOISE = "noise";

@@ -4,6 +4,7 @@
 //! here. Thresholds are opinions, and lie here too, beside the words; what is counted of the samples for them is in
 //! [`strapd_attitude::condition::quality`]. A finding's `code` is stable: scripts match on it.
 
+mod cures;
 mod live;
 mod magnetometer;
 mod orientation;
@@ -13,6 +14,7 @@ mod sensors;
 mod stream;
 mod verdicts;
 
+pub(crate) use cures::cure;
 pub use live::{LiveFindings, SensorWatch, is_of_gyro, says};
 pub use run::of_sensor;
 pub(crate) use run::{Noted, of_run};
@@ -153,6 +155,11 @@ fn of_run_and_samples(topic: &CheckedTopic) -> Vec<Finding> {
     }));
     sensors::settle(&mut found);
     stream::settle(&mut found);
+    found.extend(
+        summary
+            .mended_text()
+            .map(|said| Finding::new(Severity::Note, "mended", format!("applied: {said}"))),
+    );
     if summary.aided.is_some() {
         found.iter_mut().for_each(samples::follow_bias);
     }

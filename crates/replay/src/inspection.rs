@@ -140,6 +140,8 @@ pub struct Checked {
     pub no_topic: Option<Finding>,
     /// Nothing was to correct the attitude that is judged.
     pub is_gyro_alone: bool,
+    /// Settings by which the log was examined, with what was mended.
+    pub plan: EstimationSettings,
     /// Topics of samples.
     pub topics: Vec<CheckedTopic>,
     /// Topics of samples beyond those, which were not examined.

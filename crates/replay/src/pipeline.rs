@@ -13,6 +13,7 @@
 //! | `replay_start`, `session_builder`, `session`, `delivery`, `pace`, `position`, `audience` | a run under way: what waits, what goes out, when, and who may stop it |
 //! | `inspection`, `check`, `each`, `history`, `sample_kinds`, `attitude_track` | looking at a log, and holding it against others |
 //! | `in_memory`, `samples` | for a program: the attitudes of a replay; those of samples that it holds itself |
+//! | `mend` | settings that the recording itself corrects, where that is asked for |
 //! | `unmet` | what was asked for and could not be done |
 //! | `recover`, `simulate`, `summarise`, `provenance` | the other runs, and what is said at their end |
 
@@ -24,6 +25,7 @@ mod delivery;
 mod history;
 pub mod in_memory;
 pub mod inspection;
+pub(crate) mod mend;
 pub mod opening;
 pub mod pace;
 pub mod position;

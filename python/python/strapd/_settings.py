@@ -44,6 +44,7 @@ class Settings(TypedDict, total=False):
     on_gap: Optional[Literal["hold", "bridge", "reset"]]
     earth_rate: Optional[float]
     regularise_stamps: Optional[bool]
+    mend: Optional[bool]
     gyro_range: Optional[float]
     spikes: Optional[Literal["repair", "keep"]]
     noise: Union[str, dict[str, Any], None]
@@ -85,6 +86,7 @@ SETTINGS = frozenset(
         "on_gap",
         "earth_rate",
         "regularise_stamps",
+        "mend",
         "gyro_range",
         "spikes",
         "noise",

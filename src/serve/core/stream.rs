@@ -48,6 +48,7 @@ use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use strapd_attitude::record::{Declared, TimeUnit};
+use strapd_attitude::setting::MEND;
 use strapd_recording::decode::{Ambiguous, Line};
 use strapd_recording::recording::early_besides;
 
@@ -114,6 +115,10 @@ pub struct SensorStream {
 /// # Errors
 /// In words, with the flag that helps: what a live stream cannot do.
 pub fn live_plan(plan: &EstimationSettings) -> Result<EstimationSettings, Diagnostic> {
+    if plan.mend {
+        let what = format!("{MEND}: what a recording tells as a whole, a live stream cannot");
+        return Err(Diagnostic::new(what).help("give the settings that its findings name"));
+    }
     let mut plan = plan.clone();
     if plan.method == Method::Auto {
         plan.method = Method::COMMIT;

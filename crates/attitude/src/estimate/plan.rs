@@ -11,9 +11,9 @@ use crate::propagate::{self, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
 use crate::setting::{
-    ACCEL_SCALE, AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_AXES, MAG_HARD_IRON,
-    MAG_MOUNT, METHOD, RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, UNDO_TRUNCATION,
-    WORLD,
+    ACCEL_SCALE, AID, BIAS, CALIBRATION, Choice, DECLINATION, EARTH_RATE, INIT, MAG_AXES,
+    MAG_HARD_IRON, MAG_MOUNT, METHOD, RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME,
+    UNDO_TRUNCATION, WORLD,
 };
 use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
@@ -81,6 +81,10 @@ pub struct EstimationSettings {
     /// Treatment of spikes of the gyro in a recording: one to three samples that nothing around them agrees with.
     /// Default: [`SpikePolicy::Repair`].
     pub spikes: SpikePolicy,
+    /// Whether cures that are certain are applied to a recording. Default: `false`, findings name them.
+    pub mend: bool,
+    /// Cures that were applied. Default: none.
+    pub mended: Vec<Mended>,
     /// Noise of the sensor: sigma of the attitude grows by it, and the filter expects it. Default: the class `consumer`.
     pub noise: Noise,
     /// Measurements that correct the attitude of the gyro: gravity holds the tilt, a magnetic field the heading. Default:
@@ -114,6 +118,15 @@ pub struct EstimationSettings {
     pub start: Option<f64>,
     /// Time after the first stamp behind which samples are left out, s. Default: `None`.
     pub until: Option<f64>,
+}
+
+/// Cure that was applied to a recording.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Mended {
+    /// Finding that is cured.
+    pub what: String,
+    /// Settings that cure it.
+    pub settings: Vec<Choice>,
 }
 
 /// Longest delay of a sensor's own filters, s.
@@ -174,6 +187,8 @@ impl Default for EstimationSettings {
             regularise_stamps: false,
             gyro_range: None,
             spikes: SpikePolicy::Repair,
+            mend: false,
+            mended: Vec::new(),
             noise: Noise::by_data(),
             aid: Aid::None,
             smooth: false,

@@ -1,6 +1,6 @@
 //! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
-use super::{Finding, Severity, magnetometer, orientation, samples, sensors, stream};
+use super::{Finding, Severity, cures, magnetometer, orientation, samples, sensors, stream};
 use crate::summary::aid::Frozen;
 use crate::summary::clocks::{clock_was_set, counter_wraps};
 use crate::summary::{Gaps, TopicSummary, significant};
@@ -136,6 +136,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     }
     sensors::settle(&mut out);
     stream::settle(&mut out);
+    cures::offer(&mut out);
     out
 }
 

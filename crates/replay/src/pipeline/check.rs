@@ -5,11 +5,12 @@
 
 use super::attitude_track::Track;
 use super::inspection::look_as;
+use super::mend;
 use super::position::Position;
 use super::replay_topics::each;
 use super::request::ReplayRequest;
 use super::summarise::TopicOutcome;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::findings::no_topic;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
 use strapd_attitude::estimate::{Aid, EstimationSettings};
@@ -81,6 +82,31 @@ pub fn examine(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<Checked> {
+    let plan = mend::settled(&asked.plan, |plan| {
+        let trial = Examination {
+            plan: plan.clone(),
+            drawing: None,
+            ..asked.clone()
+        };
+        let mut topics = examine_by(input, &trial, pool, &mut |_| {})?.topics;
+        topics.retain(|topic| topic.looked.is_likely);
+        let one = topics.pop().filter(|_| topics.is_empty());
+        let replayed = one.and_then(|topic| topic.replayed.ok());
+        Ok::<_, Error>(replayed.map(|summary| summary.findings))
+    })?;
+    let asked = Examination {
+        plan,
+        ..asked.clone()
+    };
+    examine_by(input, &asked, pool, watch)
+}
+
+fn examine_by(
+    input: &Input,
+    asked: &Examination<'_>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<Checked> {
     let named = asked
         .selection
         .topic
@@ -124,6 +150,7 @@ pub fn examine(
         made_before: log.made_before().filter(|_| named.is_none()),
         no_topic,
         is_gyro_alone: asked.plan.aid == Aid::None,
+        plan: asked.plan.clone(),
         topics,
         left_out: match named {
             Some(_) => Vec::new(),

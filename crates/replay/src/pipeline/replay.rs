@@ -9,7 +9,7 @@ use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
 use super::session_builder::begin;
 use super::summarise;
-use super::{opening, replay_stream};
+use super::{mend, opening, replay_stream};
 use crate::error::{Error, Result};
 use crate::sink::Flow;
 use crate::summary::{RunSummary, human_bytes};
@@ -18,7 +18,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Patience, Preparation, Prepared};
+use strapd_attitude::estimate::{EstimationSettings, Patience, Preparation, Prepared};
+use strapd_attitude::setting::MEND;
 use strapd_recording::Input;
 use strapd_recording::MadeBefore;
 use strapd_recording::Recording;
@@ -43,8 +44,24 @@ pub fn run(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let begun = Instant::now();
+    let is_once = match &run.source {
+        Source::File(path) => is_pipe(path),
+        Source::Stdin => true,
+        Source::Elsewhere(_) | Source::Parts(_) => false,
+    };
+    if run.plan.mend && is_once {
+        tracing::warn!("{MEND}: a stream is read once, so nothing of it is changed");
+    }
+    let mended;
+    let run = match run.plan.mend && !is_once {
+        true => {
+            mended = mended_request(run, pool)?;
+            &mended
+        }
+        false => run,
+    };
     let mut summary = match &run.source {
-        Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
+        Source::File(path) if is_once => piped(run, open(path)?, pool, watch)?,
         Source::File(_) | Source::Elsewhere(_) => {
             let input = match &run.source {
                 Source::Elsewhere(address) => opening::elsewhere(address)?,
@@ -57,6 +74,39 @@ pub fn run(
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
     Ok(summary)
+}
+
+/// The request with settings that the recording itself corrects.
+fn mended_request(run: &ReplayRequest, pool: &Pool) -> Result<ReplayRequest> {
+    let dry = ReplayRequest {
+        targets: Vec::new(),
+        copy_input: false,
+        speed: None,
+        audience: None,
+        against: None,
+        reference: None,
+        ..run.clone()
+    };
+    let plan = mend::settled(&run.plan, |plan| {
+        let plan = EstimationSettings {
+            mend: false,
+            ..plan.clone()
+        };
+        let trial = ReplayRequest {
+            plan,
+            ..dry.clone()
+        };
+        let mut topics = self::run(&trial, pool, &mut |_| {})?.topics;
+        let one = topics.pop().filter(|_| topics.is_empty());
+        Ok::<_, Error>(one.map(|topic| topic.findings))
+    })?;
+    Ok(ReplayRequest {
+        plan: EstimationSettings {
+            mend: false,
+            ..plan
+        },
+        ..run.clone()
+    })
 }
 
 /// Standard input or a named pipe, told by the first bytes.

@@ -3,6 +3,7 @@
 //!
 //! The steps, and the words, of a replay of a file: what must be known first is found by a pass over the samples.
 
+use super::mend;
 use super::replay_start::preparation;
 use super::request::ReplayRequest;
 use super::session::{Topic, TopicInfo};
@@ -53,6 +54,18 @@ impl<E> From<Error> for Stop<E> {
 /// # Errors
 /// Samples or settings do not allow it; those of `take`.
 pub fn estimate<E>(
+    plan: &EstimationSettings,
+    samples: impl Iterator<Item = RawSample> + Clone,
+    mut take: impl FnMut(&[AttitudeSample]) -> Result<(), E>,
+) -> Result<TopicSummary, Stop<E>> {
+    let plan = mend::settled(plan, |plan| {
+        let tried = estimate_by(plan, samples.clone(), |_| take(&[]))?;
+        Ok::<_, Stop<E>>(Some(tried.findings))
+    })?;
+    estimate_by(&plan, samples, take)
+}
+
+fn estimate_by<E>(
     plan: &EstimationSettings,
     samples: impl Iterator<Item = RawSample> + Clone,
     mut take: impl FnMut(&[AttitudeSample]) -> Result<(), E>,

@@ -20,16 +20,28 @@ use serde_json::{Map, Value, json};
 use strapd_attitude::condition::{ClockSet, Wraps};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{
-    EstimationSettings, Estimator, KindReason, Meaning, Prepared, SensorCalibration, learned,
+    EstimationSettings, Estimator, KindReason, Meaning, Mended, Prepared, SensorCalibration,
+    learned,
 };
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, SampleKind, Verdict};
 use strapd_attitude::setting::{
-    ACCEL_AXES, ACCEL_SCALE, AID, GYRO_AXES, GYRO_SCALE, MAG_AXES, MAG_MOUNT, MOUNT,
+    ACCEL_AXES, ACCEL_SCALE, AID, GYRO_AXES, GYRO_SCALE, MAG_AXES, MAG_MOUNT, MEND, MOUNT,
 };
 use strapd_attitude::worlds::EARTH_RATE;
+
+/// Codes of errors by which an attitude is wrong by more than its sigma: sensors that contradict each other.
+const CONTRADICT: [&str; 7] = [
+    "gyro-axes",
+    "gyro-scale",
+    "unit-degrees",
+    "mag-axes",
+    "two-sensors",
+    "gyro-unit-change",
+    "accel-unit-change",
+];
 
 /// Summary of one topic: of a log, or of samples that still come.
 #[derive(Clone, Debug, Default)]
@@ -72,6 +84,8 @@ pub struct TopicSummary {
     pub input_axes: String,
     /// Maps and factors of single sensors, where settings state them.
     pub sensor_maps: Option<String>,
+    /// Cures that were applied.
+    pub mended: Vec<Mended>,
     /// Axes of the body.
     pub body: String,
     /// World of the attitude.
@@ -193,6 +207,7 @@ impl TopicSummary {
                 .filter(|_| recording.is_none()),
             input_axes: resolved.body.to_string(),
             sensor_maps: sensor_maps(plan),
+            mended: plan.mended.clone(),
             gaps,
             turned: propagation.angle_turned,
             largest_step: propagation.largest_step,
@@ -261,6 +276,11 @@ impl TopicSummary {
             Row::value("input_axes", self.input_axes.as_str()),
             Row::value("sensor_maps", self.sensor_maps.as_deref())
                 .told("sensors", self.sensor_maps.clone()),
+            Row::value(
+                "mended",
+                self.mended.iter().map(mended_json).collect::<Value>(),
+            )
+            .told("mended", self.mended_text()),
             Row::value("body", self.body.as_str()),
             Row::value("world", self.world.as_str()),
             Row::value("initial", self.initial.as_str()).told("frames", [self.frames_text()]),
@@ -280,6 +300,7 @@ impl TopicSummary {
             Row::value("final", self.has_attitude().then(|| self.final_json()))
                 .told("final", [self.final_text()]),
             Row::value("noise", self.noise.as_str()).told("sigma", seen(self.sigma_text())),
+            Row::value("sigma_holds", self.sigma_holds()).told("", self.sigma_doubt()),
             Row::value(
                 "sigma_terms",
                 self.sigma_terms.as_ref().map(SigmaTerms::json),
@@ -454,6 +475,35 @@ impl TopicSummary {
         format!("{x}, {y}, {z} deg about x, y, z at the end; {of}")
     }
 
+    /// Cures that were applied, in one line.
+    pub(crate) fn mended_text(&self) -> Option<String> {
+        let settings = self.mended.iter().flat_map(|mended| &mended.settings);
+        let settings: Vec<String> = settings.map(ToString::to_string).collect();
+        let first = self.mended.first()?;
+        Some(format!("{} ({MEND}): {}", settings.join(" "), first.what))
+    }
+
+    /// Whether the attitude can be as good as its sigma: not where sensors contradict each other, or are not what they
+    /// are taken for.
+    #[must_use]
+    pub fn sigma_holds(&self) -> bool {
+        self.contradiction().is_none()
+    }
+
+    fn contradiction(&self) -> Option<&Finding> {
+        let is_one = |f: &&Finding| f.severity == Severity::Error && CONTRADICT.contains(&f.code);
+        self.findings.iter().find(is_one)
+    }
+
+    /// Doubt about sigma, where there is one.
+    pub(crate) fn sigma_doubt(&self) -> Option<String> {
+        let found = self.contradiction()?;
+        Some(format!(
+            "it does not hold: {} ({}), and what that does to the attitude is not in it; cure that first",
+            found.what, found.code
+        ))
+    }
+
     fn error_text(&self) -> String {
         self.integration_error.map_or_else(
             || "integration error not estimated for this method".to_owned(),
@@ -484,6 +534,19 @@ impl TopicSummary {
             ),
         }
     }
+}
+
+fn mended_json(mended: &Mended) -> Value {
+    let settings = mended.settings.iter();
+    let settings: Map<String, Value> = settings
+        .map(|choice| {
+            (
+                choice.setting.name().to_owned(),
+                choice.value.as_str().into(),
+            )
+        })
+        .collect();
+    json!({ "what": mended.what, "settings": settings })
 }
 
 /// Maps and factors of single sensors that differ from nothing.

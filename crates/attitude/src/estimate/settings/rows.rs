@@ -51,7 +51,7 @@ const ROW: Row = Row {
 /// Every setting of an estimation.
 // A row is read as one; broken at 100 columns it is a page.
 #[rustfmt::skip]
-pub static ROWS: [Row; 36] = [
+pub static ROWS: [Row; 37] = [
     Row {
         setting: TIME,
         meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
@@ -436,6 +436,14 @@ pub static ROWS: [Row; 36] = [
         meaning: "Replace stamps that jitter by evenly spaced ones: a straight line through the stamps of each stretch of constant rate (a stream: a causal tracker). Only for a sensor that samples evenly",
         default: Default::Unset("off"),
         takes: Takes::Switch(|p, on| p.regularise_stamps = on),
+        ..ROW
+    },
+    Row {
+        setting: MEND,
+        meaning: "Apply to a recording what is certain: the axes or the scale of a sensor that contradict the others, where the cure was tried on the whole recording and leaves no contradiction",
+        effect: "Unset, the finding names the settings and nothing is changed. What was applied is in the summary (`mended`). The recording is read up to four times more; of several sensors, and of a stream, nothing is changed.",
+        default: Default::Unset("findings advise, nothing is changed"),
+        takes: Takes::Switch(|p, on| p.mend = on),
         ..ROW
     },
     Row {

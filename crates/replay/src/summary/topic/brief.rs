@@ -42,6 +42,7 @@ impl TopicSummary {
                 lines.extend(corrected.first().map(|said| (corrector, cut(said))));
             }
         }
+        lines.extend(self.mended_text().map(|said| ("mended", cut(&said))));
         lines.push(("final", self.brief_final()));
         let lost = self.counts.lost() + self.left_out > 0;
         let lost = lost.then(|| self.lost_text(false));
@@ -79,8 +80,12 @@ impl TopicSummary {
             _ => 3,
         };
         let [x, y, z] = sigma.map(|v| significant(v, 2));
+        let holds = match self.sigma_holds() {
+            true => "",
+            false => " DOES NOT HOLD: see warning",
+        };
         format!(
-            "roll {roll:.digits$}, pitch {pitch:.digits$}, yaw {yaw:.digits$} deg; sigma {x}, {y}, {z} deg about x, y, z"
+            "roll {roll:.digits$}, pitch {pitch:.digits$}, yaw {yaw:.digits$} deg; sigma {x}, {y}, {z} deg about x, y, z{holds}"
         )
     }
 
