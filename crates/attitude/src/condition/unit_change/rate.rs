@@ -22,8 +22,11 @@ const UNITS: [f64; 3] = [
 const JUMPS: f64 = 1.8;
 const RIGHT: f64 = 2.2;
 /// How far the logarithm of the jump of the ratio, and that of the rates, may be from that of two units.
-const NEAR: f64 = 0.9;
+const NEAR: f64 = 0.6;
 const RATES_NEAR: f64 = 1.6;
+/// Least rotation of gravity by the rates in a window, as a logarithm (0.0015 rad): below they are noise and bias, and a
+/// body that is pushed about without rotating looks like one in a smaller unit.
+const LEAST: f64 = -6.5;
 /// Scatter of the logarithm within each.
 const SCATTER: f64 = 0.9;
 /// Windows that show a ratio, most that are remembered of it, and the time within which they come, ns.
@@ -125,7 +128,8 @@ impl Level {
             off(a).total_cmp(&off(b))
         })?;
         let is_unit = (jump - unit.ln()).abs() < NEAR && (of_rates - unit.ln()).abs() < RATES_NEAR;
-        (is_steady && is_unit).then(|| UnitChange {
+        let is_motion = self.rate.min(other.rate) > LEAST;
+        (is_steady && is_unit && is_motion).then(|| UnitChange {
             at,
             factor: unit,
             is_first_right: match (self.ratio.abs() < RIGHT, other.ratio.abs() < RIGHT) {

@@ -85,7 +85,7 @@ fn a_gyro_that_goes_from_one_unit_to_another_is_found_where_it_does() {
         (57.3, 1.0),
         (1.0, 1.0 / 57.3),
         (1.0, 1000.0),
-        (0.001, 1.0),
+        (1000.0, 1.0),
     ] {
         let changed = |n: i64| {
             let mut entry = swing(n);
