@@ -9,6 +9,7 @@
 //! RawSample -> gate (one sample alone) -> order (in time) -> spikes -> timing (interval, join) -> RateSample
 //! RateSample -> stillness (rests: bias, level)         RawSample -> quality (what `info` prints)
 //! RawSample -> truncation (did the driver cut?), rails (was an axis clipped?)
+//! behind the gate, in the order samples come: mixture (two sensors?), unit_change (another unit from here on?)
 //! ```
 //!
 //! # Policy
