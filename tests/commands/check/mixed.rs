@@ -152,8 +152,8 @@ fn mending_applies_a_certain_cure_and_leaves_good_data_as_they_are() {
     assert_eq!(flags, Some("--gyro-axes YXZ, or --mend"));
     assert_eq!(as_recorded["sigma_holds"], false);
     assert_eq!(as_recorded["mended"], serde_json::json!([]));
-    let text = strapd(dir.path(), "replay --aid auto swapped.csv").err;
-    assert!(text.contains("DOES NOT HOLD"), "{text}");
+    let text = strapd(dir.path(), "replay --aid auto swapped.csv").out;
+    assert!(text.contains("it does not hold: "), "{text}");
 
     let (errors, mended) = replayed(dir.path(), "--mend swapped.csv");
     assert_eq!(errors, Vec::<String>::new());
@@ -161,11 +161,10 @@ fn mending_applies_a_certain_cure_and_leaves_good_data_as_they_are() {
     assert_eq!(mended["sigma_holds"], true);
     let (_, by_hand) = replayed(dir.path(), "--gyro-axes YXZ swapped.csv");
     assert_eq!(mended["final"], by_hand["final"]);
-    let text = strapd(dir.path(), "replay --aid auto --mend swapped.csv").err;
+    let text = strapd(dir.path(), "replay --aid auto --mend swapped.csv").out;
     assert!(text.contains("mended   --gyro-axes YXZ (--mend)"), "{text}");
     let checked = strapd(dir.path(), "check --aid auto --mend -v swapped.csv").out;
     assert!(checked.contains("applied: --gyro-axes YXZ"), "{checked}");
-    assert!(!checked.contains("disagree:\n"), "{checked}");
 
     let (errors, mended) = replayed(dir.path(), "--mend good.csv");
     assert_eq!(errors, Vec::<String>::new());
