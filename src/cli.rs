@@ -13,6 +13,7 @@ pub mod config;
 mod continued;
 pub mod estimation;
 pub mod info;
+mod invitation;
 mod known_words;
 pub mod manual;
 pub mod model;

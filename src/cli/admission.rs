@@ -1,5 +1,6 @@
 //! Flags of who may connect. I/O: reads the token file.
 
+use crate::client::secret::Secret;
 use crate::error::Result;
 use crate::serve::Settings;
 use crate::serve::core::hub;
@@ -34,17 +35,23 @@ pub struct Admission {
 }
 
 impl Admission {
-    /// Applies them to these settings.
+    /// Applies them to these settings. Where the page `is_lan`, a token is made if none is given.
     ///
     /// # Errors
     /// The token file cannot be read, or holds none.
-    pub(super) fn apply(&self, settings: Settings) -> Result<Settings> {
+    pub(super) fn apply(&self, settings: Settings, is_lan: bool) -> Result<Settings> {
+        let secret = match &self.token_file {
+            Some(path) => Some(Secret::read("--token-file", path)?),
+            None if is_lan && !self.allow_insecure_remote => Some(Secret::random()?),
+            None => None,
+        };
         Ok(Settings {
             hub: hub::Settings {
-                token: self.token_file.as_deref().map(Token::read).transpose()?,
+                token: secret.as_ref().map(|secret| Token::new(secret.reveal())),
                 limits: settings.hub.limits.of_clients(self.max_clients),
                 ..settings.hub
             },
+            invitation: secret.filter(|_| is_lan),
             allow_insecure_remote: self.allow_insecure_remote,
             web: Web {
                 hosts: self.allow_host.clone(),

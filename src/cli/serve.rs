@@ -4,10 +4,12 @@ use super::admission::Admission;
 use super::calibration_files::{self, file_of};
 use super::config::Layered;
 use super::estimation::Estimation;
+use super::invitation::{self, Invitation};
 use super::tables::Tables;
 use super::{Global, Outcome, serial};
 use crate::address::Address;
 use crate::client::remote::Remote;
+use crate::client::secret::Secret;
 use crate::error::{Error, Result};
 use crate::serve::core::hub::{self, Hub};
 use crate::serve::core::reading::LineParameters;
@@ -19,7 +21,7 @@ use crate::serve::edge::source::Endpoint;
 use crate::serve::guard::limits::Limits;
 use crate::serve::guard::shutdown::Signals;
 use crate::serve::{Listening, Server, Settings};
-use crate::sink::address::DEFAULTS;
+use crate::sink::address::{DEFAULTS, LAN};
 use crate::sink::{Format, Target};
 use clap::Args;
 use std::io::IsTerminal;
@@ -56,6 +58,7 @@ Talk to it:
   echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
   echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
   http://127.0.0.1:8765/ in a browser                          the live page; /top: a top to spin
+  strapd serve --lan                                           the same from a phone: scan the code
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
     /// Other sources of samples: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH,
@@ -68,6 +71,11 @@ pub struct Serve {
     /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
     #[arg(long, value_name = "URI")]
     pub listen: Vec<String>,
+    /// Show the page to this network: listen on ws-listen://0.0.0.0:8765 (and on tcp-listen://127.0.0.1:4550; --listen
+    /// chooses others), and print links that hold the token, with a QR code. Without --token-file a token is
+    /// made for this run; a FILE that does not exist yet is made, and keeps it
+    #[arg(long)]
+    pub lan: bool,
     /// Send every attitude there, too: tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler], or in the protocol of
     /// another program opentrack://, osc://, vmc://, slimevr://, mavlink://HOST:PORT[?id=NAME&rate=HZ]. May be given
     /// several times
@@ -169,6 +177,10 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
             source,
         })?;
     }
+    // Before it is read.
+    if let (true, Some(path)) = (args.lan, &args.admission.token_file) {
+        Secret::random()?.keep(path)?;
+    }
     let mut settings = match &layered {
         Some(layered) => layered.settings()?,
         None => asked.settings()?,
@@ -187,7 +199,12 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     settings.hub.recorder = recorder.as_ref().map(Recorder::handle);
     let runtime = runtime(global.threads)?;
     let has_stdin = args.sources.iter().any(|s| s == "-");
-    let outcome = runtime.block_on(serve(settings, has_stdin, (state, calibrations)));
+    let inviting = args.lan.then(|| Invitation {
+        token: settings.invitation.take(),
+        is_made: args.admission.token_file.is_none(),
+    });
+    let kept = (state, calibrations);
+    let outcome = runtime.block_on(serve(settings, has_stdin, inviting, kept));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
     let Some(status) = recorder.map(Recorder::finish) else {
@@ -225,6 +242,7 @@ fn runtime(threads: usize) -> Result<tokio::runtime::Runtime> {
 async fn serve(
     settings: Settings,
     has_stdin: bool,
+    inviting: Option<Invitation>,
     (state, calibrations): (Option<Arc<Mutex<StateFile>>>, Option<&Path>),
 ) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
@@ -233,6 +251,7 @@ async fn serve(
     let addresses: Vec<String> = server.addresses().iter().map(ToString::to_string).collect();
     let hub = server.hub().clone();
     tracing::info!(session = hub.session(), "ready {}", addresses.join(" "));
+    invitation::show(server.addresses(), inviting.as_ref());
     // Nobody may have started us that wants to know.
     let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
     tokio::spawn(pat_the_watchdog());
@@ -416,14 +435,14 @@ impl Serve {
     /// [`Error::Usage`] naming the flag; the token file cannot be read.
     pub(crate) fn settings(&self) -> Result<Settings> {
         let given: Vec<&str> = if self.listen.is_empty() {
-            DEFAULTS.to_vec()
+            if self.lan { LAN } else { DEFAULTS }.to_vec()
         } else {
             self.listen.iter().map(String::as_str).collect()
         };
         let (plan, plans) = self.estimation.live_plans()?;
         let mut decode = self.estimation.selection()?.decode;
         self.tables.put(&mut decode)?;
-        self.admission.apply(Settings {
+        let settings = Settings {
             hub: hub::Settings {
                 decode,
                 lines: LineParameters {
@@ -452,6 +471,7 @@ impl Serve {
             #[cfg(unix)]
             passed: listen::Passed::from_env(),
             ..Settings::default()
-        })
+        };
+        self.admission.apply(settings, self.lan)
     }
 }

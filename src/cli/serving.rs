@@ -143,14 +143,15 @@ impl Serving {
             } else {
                 None
             });
-            let settings = self.admission.apply(Settings {
+            let settings = Settings {
                 hub: hub::Settings {
                     brings_samples,
                     ..hub::Settings::default()
                 },
                 listen: listen.into_iter().map(Into::into).collect(),
                 ..Settings::default()
-            })?;
+            };
+            let settings = self.admission.apply(settings, false)?;
             let cast = PlaybackServer::start(settings, playback, self.page.is_some(), true)?;
             let addresses: Vec<String> = cast.addresses().iter().map(ToString::to_string).collect();
             tracing::info!(

@@ -1,6 +1,7 @@
 //! A file -> the token in it. Reads the file.
 
 use crate::error::{Error, Result};
+use std::io::Write;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 
@@ -36,6 +37,38 @@ impl Secret {
     #[cfg(any(feature = "nats", feature = "zenoh"))]
     pub fn of_others(flag: &str, path: &Path) -> Result<Secret> {
         Secret::no_shorter_than(1, flag, path)
+    }
+
+    /// A token of 128 random bits from the operating system, as text that needs no encoding in an address.
+    ///
+    /// # Errors
+    /// The operating system gives no random bytes.
+    pub fn random() -> Result<Secret> {
+        let mut bytes = [0; 16];
+        getrandom::fill(&mut bytes)
+            .map_err(|e| Error::usage(format!("no random token can be made: {e}")))?;
+        Ok(Secret(bytes.iter().map(|b| format!("{b:02x}")).collect()))
+    }
+
+    /// Writes it to a new file that nobody but its owner can read; a file that is there stays as it is.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn keep(&self, path: &Path) -> Result<()> {
+        let mut open = std::fs::OpenOptions::new();
+        open.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut open, 0o600);
+        let written = open
+            .open(path)
+            .and_then(|mut file| writeln!(file, "{}", self.0));
+        match written {
+            Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => Err(Error::Write {
+                path: path.to_owned(),
+                source: e,
+            }),
+            _ => Ok(()),
+        }
     }
 
     fn no_shorter_than(least: usize, flag: &str, path: &Path) -> Result<Secret> {

@@ -20,6 +20,7 @@ use super::guard::places::Places;
 use super::guard::shutdown::Shutdown;
 use crate::address::Address;
 use crate::client::remote;
+use crate::client::secret::Secret;
 use crate::error::{Error, Result};
 use crate::sink::address::Listen;
 use std::future::Future;
@@ -75,6 +76,8 @@ impl From<Listen> for Listening {
 pub struct Settings {
     /// Settings of its hub.
     pub hub: hub::Settings,
+    /// Token that links to the page carry: `--lan` alone hands it out.
+    pub invitation: Option<Secret>,
     /// Addresses to listen on.
     pub listen: Vec<Listening>,
     /// Addresses to connect to for samples.

@@ -1,5 +1,18 @@
 // The WebSocket to the daemon: kept up, and said so when it is not. docs/protocol.md is its language.
 
+// Takes the token out of a link of `strapd serve --lan`: behind # no browser sends it, and here nobody reads it over a
+// shoulder or finds it in the history. Undefined where there is none.
+export function invited() {
+  const [, given] = /[#&]token=([^&]*)/.exec(location.hash) ?? [];
+  if (!given) return undefined;
+  history.replaceState(history.state, "", location.pathname + location.search);
+  try {
+    return decodeURIComponent(given);
+  } catch {
+    return given;
+  }
+}
+
 const WAITS = [200, 400, 800, 1500];
 // STATUS is asked for every second: this long without a word, and nobody is there.
 const SILENCE = 6000;
@@ -11,6 +24,8 @@ export class Link {
     this.heard = heard;
     this.changed = changed;
     this.failures = 0;
+    const token = invited();
+    if (token) sessionStorage.setItem("token", token);
     this.token = sessionStorage.getItem("token");
     this.watchdog = setInterval(() => this.check(), 1000);
     this.connect();
@@ -39,8 +54,12 @@ export class Link {
       // Greeted is not yet watching: from here on nothing is lost.
       if (message.class === "WATCH" && message.enable) this.changed("open", "connected");
       if (message.class === "ERROR" && /^(unauthorised|bad_auth)$/.test(message.code)) {
+        if (this.refused) return;
         this.refused = true;
-        this.changed("token", message.message);
+        this.changed("token", this.token ? "this is not the token of the daemon" : "a token is needed");
+        this.token = null;
+        sessionStorage.removeItem("token");
+        return;
       }
       this.heard(message);
     };

@@ -7,7 +7,7 @@ import { Clocks } from "./clock.js";
 import { demonstration, LAST } from "./demonstration.js";
 import { Fleet } from "./fleet.js";
 import { listen } from "./keys.js";
-import { Link } from "./link.js";
+import { invited, Link } from "./link.js";
 import { Overview } from "./overview.js";
 import { plain, say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
@@ -330,6 +330,11 @@ if (frozen && stopAt === null) {
   freeze();
 } else {
   link = new Link(heard, changed);
+  // Another link, opened in this tab.
+  addEventListener("hashchange", () => {
+    const token = invited();
+    if (token) link.authorise(token);
+  });
   if (!frozen) setInterval(() => link.send({ class: "POLL" }), 1000);
 }
 requestAnimationFrame(tick);

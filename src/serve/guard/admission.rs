@@ -1,15 +1,12 @@
-//! Rules of who may listen where, who may connect, who may speak. Pure but for reading the token file.
+//! Rules of who may listen where, who may connect, who may speak. Pure.
 //!
 //! A gyro stream looks harmless, but a page in any browser can reach loopback: so names and
 //! origins are checked, and beyond loopback a token is needed.
 
 use super::failed_logins::Strangers;
 use super::fault::Fault;
-use crate::client::secret::Secret;
-use crate::error::Result;
 use sha2::{Digest, Sha256};
 use std::net::IpAddr;
-use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
@@ -34,14 +31,6 @@ impl Token {
             hash: Sha256::digest(token.as_bytes()).into(),
             strangers: Mutex::default(),
         }
-    }
-
-    /// The first line of a file that nobody but its owner can read.
-    ///
-    /// # Errors
-    /// It cannot be read, others can read it, or it holds no token of 16 bytes.
-    pub fn read(path: &Path) -> Result<Token> {
-        Secret::read("--token-file", path).map(|secret| Token::new(secret.reveal()))
     }
 
     /// Whether this is it, shown by somebody at `from`. The time taken does not depend on what is right of

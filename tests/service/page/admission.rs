@@ -147,6 +147,77 @@ fn the_page_asks_for_the_token_and_goes_on_with_it() {
     browser.until("the top, too", "__strapd.state === 'open'");
 }
 
+/// A daemon for a network: it listens on every address, with a token.
+fn in_a_network() -> (Daemon, SocketAddr) {
+    let mut settings = listening(&["ws-listen://0.0.0.0:0"]);
+    settings.hub.token = Some(Token::new(SECRET));
+    let daemon = Daemon::start(settings);
+    // Loopback too, and no name of loopback that is admitted by itself.
+    let address = SocketAddr::from(([127, 0, 0, 2], daemon.address(0).port()));
+    (daemon, address)
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_link_brings_its_token_to_the_page_and_nowhere_else() {
+    let mut browser = Browser::start();
+    let (_daemon, address) = in_a_network();
+    browser.go(address, "/?window=5#token=correct%20horse%20battery");
+    browser.until_open();
+    assert_eq!(browser.eval("location.search + location.hash"), "?window=5");
+    assert_eq!(browser.eval("sessionStorage.token"), SECRET);
+    assert_eq!(
+        browser.eval("Object.keys(localStorage)"),
+        serde_json::json!([])
+    );
+    let sent = browser.requests().join(" ");
+    assert!(sent.contains("/ws") && !sent.contains("battery"), "{sent}");
+    // A tab keeps it.
+    browser.call("Page.reload", serde_json::json!({}));
+    browser.until_open();
+
+    // A token of another daemon is forgotten, and one that comes after it is taken.
+    browser.page();
+    browser.go(address, "/#token=wrong");
+    let asks =
+        "__strapd.state === 'token' && !document.querySelector('[data-testid=token]').hidden";
+    browser.until("it asks", asks);
+    assert!(browser.text("connection").contains("not the token"));
+    assert_eq!(browser.eval("sessionStorage.length"), 0);
+    browser.eval("location.hash = 'token=correct%20horse%20battery'");
+    browser.until_open();
+    assert_eq!(browser.eval("location.hash"), "");
+
+    browser.page();
+    browser.go(address, "/");
+    browser.until("it asks", asks);
+    let words = browser.text("token") + &browser.text("connection");
+    assert!(
+        words.contains("a token is needed") && words.contains("strapd serve --lan"),
+        "{words}"
+    );
+    let body = browser.eval("document.body.innerText");
+    assert!(!body.to_string().contains("AUTH"), "{body}");
+    browser.is_unharmed();
+}
+
+#[test]
+fn a_listener_on_every_address_knows_the_one_that_was_asked_and_no_other() {
+    let (_daemon, address) = in_a_network();
+    let asked = |host: &str| get(address, "/", &[("Host", host)]).0;
+    let own = address.to_string();
+    assert_eq!(asked(&own), 200);
+    for host in [
+        "127.0.0.3",
+        "0.0.0.0",
+        "192.0.2.7",
+        "phone.example",
+        "[::1]x",
+    ] {
+        assert_eq!(asked(host), 403, "{host}");
+    }
+}
+
 #[test]
 fn an_ordinary_request_gets_the_page_and_tops_within_bounds() {
     let daemon = Daemon::start(listening(&[WS]));

@@ -2,10 +2,10 @@
 
 use super::client::{Client, ask, get, rate};
 use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};
-use std::io::{BufRead, Read};
-use std::net::IpAddr;
+use std::io::{BufRead, BufReader, Read};
+use std::net::{IpAddr, SocketAddr};
 use std::os::unix::fs::PermissionsExt;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use strapd::serve::guard::admission::{Token, Web};
 
 const SECRET: &str = "correct horse battery";
@@ -345,6 +345,74 @@ fn an_address_others_can_reach_needs_a_token() {
             .block_on(strapd::serve::Server::bind(settings));
         assert_eq!(bound.is_ok(), guarded, "{uri}");
     }
+}
+
+/// Links that `strapd serve --lan ARGS` prints at an address of loopback, and the place it listens at.
+fn invited(args: &[&str]) -> (Vec<String>, SocketAddr) {
+    let mut command = Command::new(strapd());
+    command
+        .args(["serve", "--lan", "--listen", "ws-listen://127.0.0.2:0"])
+        .args(args)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut links = Vec::new();
+    for line in lines.map(Result::unwrap) {
+        match line.strip_prefix("  ") {
+            Some(link) => links.push(link.to_owned()),
+            None if !links.is_empty() => break,
+            None => {}
+        }
+    }
+    let address = links[0].trim_start_matches("http://").split('/').next();
+    let address: SocketAddr = address.unwrap().parse().unwrap();
+    let token = links[0].rsplit_once("#token=").map(|(_, token)| token);
+    // Nobody gets in without it.
+    let host = address.to_string();
+    let asked = |shown: &str| {
+        let shown = format!("Bearer {shown}");
+        get(
+            address,
+            "/metrics",
+            &[("Host", &host), ("Authorization", &shown)],
+        )
+        .0
+    };
+    assert_eq!(get(address, "/metrics", &[("Host", &host)]).0, 401);
+    assert_eq!(asked("0123456789abcdef0123456789abcdef"), 401);
+    if let Some(token) = token {
+        assert_eq!(asked(token), 200);
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    (links, address)
+}
+
+#[test]
+fn a_network_is_given_a_link_with_a_token_of_the_run_or_of_a_file() {
+    let tokens = [(), ()].map(|()| {
+        let (links, address) = invited(&[]);
+        let token = links[0]
+            .strip_prefix(&format!("http://{address}/#token="))
+            .unwrap();
+        assert_eq!((links.len(), token.len()), (1, 32), "{links:?}");
+        token.to_owned()
+    });
+    assert_ne!(tokens[0], tokens[1]);
+    // A file that does not exist is made, and is not printed where output is kept.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("phone.token");
+    let (links, address) = invited(&["--token-file", path.to_str().unwrap()]);
+    assert_eq!(links, [format!("http://{address}/")]);
+    let made = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(made.trim().len(), 32);
+    assert_eq!(
+        std::fs::metadata(&path).unwrap().permissions().mode() & 0o777,
+        0o600
+    );
+    invited(&["--token-file", path.to_str().unwrap()]);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), made, "it is kept");
 }
 
 #[test]

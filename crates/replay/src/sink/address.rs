@@ -60,6 +60,9 @@ impl Transport {
 /// Addresses on which `strapd serve` listens by default.
 pub const DEFAULTS: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://127.0.0.1:8765"];
 
+/// Addresses on which it listens where its page is for the network: lines stay on this machine.
+pub const LAN: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://0.0.0.0:8765"];
+
 const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one; fd:NAME for HOST:PORT is a socket of that name (or number) from the service manager";
 
 impl Listen {

@@ -29,15 +29,16 @@ use tokio::time::sleep;
 pub(super) async fn serve(listener: TcpListener, context: Context) {
     let router = router();
     let posters = Arc::new(Posters::default());
-    let bound = listener
-        .local_addr()
-        .map_or(IpAddr::from([127, 0, 0, 1]), |a| a.ip());
     accept(
         context,
         Kind::Http,
         || listener.accept(),
         |(stream, peer), context, place| {
             prepare(&stream);
+            // Of a listener on every address: the one that was asked. No name leads to it that is not allowed.
+            let bound = stream
+                .local_addr()
+                .map_or(IpAddr::from([127, 0, 0, 1]), |a| a.ip().to_canonical());
             let place = Arc::new(place);
             let limits = *context.hub.limits();
             let stream = Stalling::new(stream, limits.no_progress, place.clone());
