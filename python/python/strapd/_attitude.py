@@ -193,6 +193,18 @@ class Attitude:
         angles: npt.NDArray[np.float64] = self.rotation().as_euler(seq, degrees=degrees)
         return angles
 
+    def at(self, times: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Quaternions (m, 4) at other instants, such as the frames of a camera: between samples, not the nearest of them.
+
+        A cubic on the rotation group goes through the attitudes with the rates that the steps beside tell. NaN outside
+        the run and in gaps that the attitude was held over, with a warning that counts them.
+
+        :param times: int64 nanoseconds of the clock of ``t``, or datetime64.
+        """
+        from ._between import at
+
+        return at(self, times)
+
     def to_dict(self) -> dict[str, npt.NDArray[Any]]:
         """Columns of one dimension by name, for pandas, polars and the like."""
         sigma = self.sigma
