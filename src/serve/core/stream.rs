@@ -14,7 +14,7 @@ pub(super) mod doubts;
 mod intervals;
 mod joining;
 mod losing;
-mod resetting;
+pub(in crate::serve::core) mod resetting;
 pub mod run;
 mod stamp_unit;
 pub mod stamps;
@@ -28,6 +28,7 @@ use crate::serve::core::state::Saved;
 use crate::serve::guard::fault::Fault;
 use crate::sink::Stream;
 use arrival::Arrivals;
+use attitude_now::attitude_now;
 use doubts::Doubts;
 use intervals::Intervals;
 use joining::Joining;
@@ -454,6 +455,14 @@ impl SensorStream {
     /// Health, which a replay's streams report of themselves, too.
     pub(in crate::serve) fn health(&self) -> Health {
         Health::of(&self.estimator)
+    }
+
+    /// One sigma of tilt and heading, degrees, where a vertical is known.
+    #[must_use]
+    pub fn sigma_degrees(&self) -> Option<[f64; 2]> {
+        let now = attitude_now(self.estimator.filter(), self.last.as_ref());
+        let of = |name: &str| now["sigma_deg"][name].as_f64();
+        Some([of("tilt")?, of("heading")?])
     }
 
     /// State for `STATUS`.

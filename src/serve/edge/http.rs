@@ -6,7 +6,7 @@ mod metrics;
 mod overview;
 
 use super::listen::websocket;
-use super::{page, samples, top_page};
+use super::{page, resets, samples, top_page};
 use crate::serve::guard::places::Kind;
 use crate::serve::protocol::foxglove::SUBPROTOCOLS;
 use answer::{refusal, response, unauthorised};
@@ -33,13 +33,14 @@ pub(crate) fn router() -> Router {
             "/samples",
             post(samples::post).fallback(samples::not_posted),
         )
+        .route("/reset", post(resets::post).fallback(samples::not_posted))
         .merge(page::router())
         .route("/model/top", get(top_page::answer))
         .fallback(|| async {
             refusal(
                 StatusCode::NOT_FOUND,
                 "not_found",
-                "there are /, /top, /ws, /samples, /healthz and /metrics",
+                "there are /, /top, /ws, /samples, /reset, /healthz and /metrics",
             )
         })
 }
@@ -112,7 +113,7 @@ fn subprotocol(headers: &HeaderMap) -> Option<&'static str> {
         })
 }
 
-/// Whether samples are taken: 200, or 503 while shutting down.
+/// Whether samples are taken: 200, or 503 while shutting down; and what else does not go on.
 async fn health(Extension(connection): Extension<Connection>) -> Response<Body> {
     if connection.hub.is_stopping() {
         return response(
@@ -121,5 +122,11 @@ async fn health(Extension(connection): Extension<Connection>) -> Response<Body> 
             "stopping\n",
         );
     }
-    response(StatusCode::OK, "text/plain; charset=utf-8", "ok\n")
+    // Samples are taken, whatever else does not go on: who restarts it for that loses them.
+    let troubles = connection.hub.troubles();
+    let mut text = "ok\n".to_owned();
+    for trouble in troubles {
+        text.push_str(&format!("but {trouble}\n"));
+    }
+    response(StatusCode::OK, "text/plain; charset=utf-8", text)
 }

@@ -35,7 +35,7 @@ pub(in crate::serve) struct SamplesQuery {
 
 /// Form in which a body holds its objects.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Form {
+pub(super) enum Form {
     Json,
     Lines,
 }
@@ -134,7 +134,7 @@ pub(super) async fn not_posted() -> Response<Body> {
     let mut refused = refusal(
         StatusCode::METHOD_NOT_ALLOWED,
         "method_not_allowed",
-        "samples are sent here with POST; docs/protocol.md says how",
+        "this takes POST; docs/protocol.md says how",
     );
     let allowed = axum::http::HeaderValue::from_static("POST");
     refused.headers_mut().insert(header::ALLOW, allowed);
@@ -142,7 +142,7 @@ pub(super) async fn not_posted() -> Response<Body> {
 }
 
 /// Whether no browser's page can have sent this.
-fn no_page(headers: &HeaderMap) -> Result<(), String> {
+pub(super) fn no_page(headers: &HeaderMap) -> Result<(), String> {
     if let Some(origin) = headers.get(header::ORIGIN) {
         let origin = String::from_utf8_lossy(origin.as_bytes());
         return Err(format!("Origin {}", printable(&origin)));
@@ -158,7 +158,7 @@ fn no_page(headers: &HeaderMap) -> Result<(), String> {
 }
 
 /// Form that the headers state of the body.
-fn form(headers: &HeaderMap) -> Result<Form, String> {
+pub(super) fn form(headers: &HeaderMap) -> Result<Form, String> {
     let mut types = headers.get_all(header::CONTENT_TYPE).iter();
     let said = match (types.next(), types.next()) {
         (Some(one), None) => one.to_str().unwrap_or_default(),
@@ -173,7 +173,7 @@ fn form(headers: &HeaderMap) -> Result<Form, String> {
 }
 
 /// The whole body, if it comes in time and is not too long.
-async fn read(
+pub(super) async fn read(
     connection: &Connection,
     headers: &HeaderMap,
     body: Body,

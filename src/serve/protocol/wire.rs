@@ -10,7 +10,7 @@ mod resetting;
 
 pub use packing::{broken_packed, packed_stream, unreadable};
 pub use reference::{Reference, TRUTH, stream as reference_stream};
-pub use resetting::{Beginning, Reset, reset_answer};
+pub use resetting::{Beginning, Reset, Sensors, posted_reset, reset_answer};
 
 use super::chunk::{Dropped, MAX_QUEUED};
 use super::filter::{Class as Stream, Filter};

@@ -1,7 +1,8 @@
 //! Admission of clients.
 
+use super::aiding::{aided, line};
 use super::client::{Client, ask, get, rate};
-use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};
+use super::daemon::{Daemon, Process, TCP, UDP, WS, eventually, listening, strapd};
 use std::io::{BufRead, BufReader, Read};
 use std::net::{IpAddr, SocketAddr};
 use std::os::unix::fs::PermissionsExt;
@@ -305,6 +306,40 @@ fn the_metrics_say_of_each_number_what_is_counted_and_count_that() {
     assert_eq!(value("bytes_in_total"), line.len() + 1 + 3 + body.len());
     assert_eq!(value("faults_total"), 1);
     assert_eq!((value("samples_total"), value("attitudes_total")), (2, 2));
+}
+
+#[test]
+fn the_metrics_have_age_rate_and_sigma_of_each_sensor() {
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.plan = aided();
+    let daemon = Daemon::start(settings);
+    let mut sender = Client::tcp(daemon.address(0));
+    let lines: Vec<String> = (0..300).map(line).collect();
+    sender.send(&lines.join("\n"));
+    eventually("all was taken", || {
+        daemon.status()["sources"][0]["attitudes"] == 300
+    });
+    let address = daemon.address(1);
+    let host = address.to_string();
+    let value = |name: &str| -> f64 {
+        let text = get(address, "/metrics", &[("Host", &host)]).1;
+        let found = text.lines().find_map(|l| l.strip_prefix(name));
+        let found = found.unwrap_or_else(|| unreachable!("{name}: {text}"));
+        found.trim().parse().unwrap()
+    };
+    let rate = value("strapd_sensor_rate_hertz{id=\"imu0\"}");
+    assert!((rate - 100.0).abs() < 1e-6, "{rate}");
+    let sigma = &daemon.status()["sources"][0]["attitude"]["sigma_deg"];
+    for of in ["tilt", "heading"] {
+        let name = format!("strapd_sensor_sigma_degrees{{id=\"imu0\",of=\"{of}\"}}");
+        assert_eq!(Some(value(&name)), sigma[of].as_f64(), "{of}");
+    }
+    let age = || value("strapd_sensor_age_seconds{id=\"imu0\"}");
+    let before = age();
+    eventually("it ages", || age() >= before + 1.0);
+    // Its next sample makes it young again.
+    sender.send(&line(300));
+    eventually("it is young", || age() < before + 1.0);
 }
 
 /// Words and exit code of `strapd serve ARGS`, which must not start.

@@ -521,6 +521,118 @@ fn ten_thousand_resets_are_answered_each_and_turn_nobody_elses_attitude() {
     assert_eq!(status["counters"]["resets_refused"], refused);
 }
 
+/// Heading of the newest attitude of each sensor after a second sample of all, degrees.
+fn headings(daemon: &Daemon, sender: &mut Client, ids: &[&str]) -> Vec<f64> {
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let lines: Vec<String> = (500..502)
+        .flat_map(|n| ids.iter().map(move |id| line(n).replace("imu0", id)))
+        .collect();
+    sender.send(&lines.join("\n"));
+    let mut found = std::collections::BTreeMap::new();
+    while found.len() < ids.len() {
+        let att = watcher.next_of("ATT");
+        if is_reset(&att) {
+            found.insert(
+                att["id"].as_str().unwrap().to_owned(),
+                yaw(&att.to_string()),
+            );
+        }
+    }
+    ids.iter().map(|id| found[*id]).collect()
+}
+
+#[test]
+fn several_sensors_begin_anew_at_one_instant_or_none_of_them_does() {
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.plan = aided();
+    let alone = EstimationSettings::default();
+    settings.hub.plans.insert("alone".to_owned(), alone);
+    let daemon = Daemon::start(settings);
+    let ids = ["hip", "knee", "ankle"];
+    let mut sender = Client::tcp(daemon.address(0));
+    let lines: Vec<String> = (0..500)
+        .flat_map(|n| ids.iter().map(move |id| line(n).replace("imu0", id)))
+        .collect();
+    sender.send(&lines.join("\n"));
+    // A gyro alone, which has no heading to be set.
+    sender.send(&rate("alone", 0, 1.0));
+    eventually("all was taken", || {
+        daemon.status()["counters"]["attitudes"] == 1501
+    });
+    let address = daemon.address(1);
+    let host = address.to_string();
+    let post = |body: Value, extra: &[(&str, &str)]| {
+        let mut headers = vec![("Host", &*host), ("Content-Type", "application/json")];
+        headers.extend(extra);
+        let body = body.to_string();
+        let (status, answer) = ask(address, "POST /reset", &headers, body.as_bytes());
+        (status, serde_json::from_str::<Value>(&answer).unwrap())
+    };
+    let taken = || daemon.status()["counters"]["resets"].clone();
+    for (body, status, code) in [
+        (
+            json!({"ids": ["hip", "nobody"], "heading": 40}),
+            404,
+            "unknown_sensor",
+        ),
+        (
+            json!({"ids": ["hip", "alone"], "heading": 40}),
+            400,
+            "bad_reset",
+        ),
+        (json!({"ids": [], "heading": 40}), 400, "bad_reset"),
+        (json!({"id": "hip", "all": true}), 400, "bad_reset"),
+        (
+            json!({"id": "hip", "tare": true, "heading": 1}),
+            400,
+            "bad_reset",
+        ),
+        (json!({"ids": "hip"}), 400, "bad_reset"),
+    ] {
+        let (got, said) = post(body.clone(), &[]);
+        assert_eq!(
+            (got, &said["code"]),
+            (status, &json!(code)),
+            "{body}: {said}"
+        );
+    }
+    assert_eq!(
+        post(json!({"all": true}), &[("Origin", "https://evil.example")]).0,
+        403
+    );
+    let own = format!("http://{host}");
+    assert_eq!(
+        post(json!({"all": true}), &[("Origin", &own)]).0,
+        403,
+        "no page posts"
+    );
+    assert_eq!(taken(), 0, "none of them has changed anything");
+
+    // Of all, who cannot is left out.
+    let (status, said) = post(json!({"all": true, "heading": 40}), &[]);
+    let names = json!(["ankle", "hip", "knee"]);
+    let of = |said: &Value| -> Value {
+        let each = said["sensors"].as_array().unwrap().iter();
+        each.map(|s| s["id"].clone()).collect()
+    };
+    assert_eq!((status, of(&said)), (200, names), "{said}");
+    assert_eq!(taken(), 3);
+    // A list, over the connection that sends them; the last that is asked counts.
+    sender.send("{\"class\":\"RESET\",\"ids\":[\"knee\",\"hip\"],\"tare\":true}");
+    let answer = sender.next_of("RESET");
+    assert_eq!(of(&answer), json!(["hip", "knee"]), "{answer}");
+    let [hip, knee, ankle] = headings(&daemon, &mut sender, &ids)[..] else {
+        unreachable!()
+    };
+    for (name, heading, wanted) in [
+        ("hip", hip, 0.0),
+        ("knee", knee, 0.0),
+        ("ankle", ankle, 40.0),
+    ] {
+        assert!((heading - wanted).abs() < 1.0, "{name}: {heading}");
+    }
+}
+
 #[test]
 fn a_replay_refuses_a_reset_with_words() {
     let log = "fixtures/xsens_mti.mcap";

@@ -1,11 +1,12 @@
 //! The state of everything -> `STATUS`, metrics, the file of the last attitudes.
 
-use super::{Client, Hub, SensorStream, lock, read};
+use super::{Client, Hub, SensorStream, TICK, lock, read};
 use crate::serve::core::recorder::Handle;
 use crate::serve::core::state::Sensors;
 use crate::serve::protocol::wire;
 use bytes::Bytes;
 use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 use strapd_attitude::estimate::SensorCalibration;
 
@@ -103,6 +104,28 @@ impl Hub {
             Some(_) => before,
         };
         *state = Some(StateStatus { saved, failed });
+    }
+
+    /// Troubles in words: what does not go on as was asked.
+    #[must_use]
+    pub fn troubles(&self) -> Vec<String> {
+        let recording = self.recorder.as_ref().map(Handle::status);
+        let stopped = recording.and_then(|recording| recording.stopped);
+        let failed = lock(&self.state).as_ref().and_then(|s| s.failed.clone());
+        let stopped = stopped.map(|why| format!("the recording stopped: {why}"));
+        let failed = failed.map(|why| format!("attitudes are not saved: {why}"));
+        stopped.into_iter().chain(failed).collect()
+    }
+
+    /// Seconds since something of a sensor came, in steps of [`TICK`], by name.
+    pub fn each_age(&self, mut tell: impl FnMut(&str, f64)) {
+        let sensors: Vec<_> = read(&self.sensors.by_id).values().cloned().collect();
+        let now = self.sensors.tick.load(Ordering::Relaxed);
+        for sensor in sensors {
+            let sensor = lock(&sensor);
+            let ticks = now.saturating_sub(sensor.heard_at);
+            tell(sensor.stream.id(), ticks as f64 * TICK.as_secs_f64());
+        }
     }
 
     /// Seconds since the start.

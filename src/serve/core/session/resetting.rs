@@ -21,11 +21,11 @@ impl Session {
             Asker::Client(self.client.number)
         };
         match self.hub.reset(asked, asker) {
-            Ok((asked, from)) => {
+            Ok((asked, done)) => {
                 self.errors_in_a_row = 0;
                 // Who is told nothing is not told this.
                 if !self.side.is_deaf() {
-                    self.client.outbox.reply(wire::reset_answer(&asked, from));
+                    self.client.outbox.reply(wire::reset_answer(&asked, &done));
                 }
             }
             // Well said, if in vain: not held against it.

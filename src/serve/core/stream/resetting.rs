@@ -14,6 +14,13 @@ pub(super) struct Resetting {
     pub(super) taken: u64,
 }
 
+/// Beginning that can be kept, and where it is in words.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::serve::core) struct Promise {
+    asked: Asked,
+    from: &'static str,
+}
+
 /// Beginning that was promised.
 #[derive(Clone, Copy, Debug)]
 enum Asked {
@@ -24,16 +31,16 @@ enum Asked {
 }
 
 impl SensorStream {
-    /// The attitude, or its heading alone, begins anew with the next sample, where `plan` says if nothing was said; what
-    /// was learned of the sensor is kept. Says where it will begin.
+    /// Judges whether the attitude, or its heading alone, can begin anew with the next sample, where `plan` says if nothing
+    /// was said. Nothing changes yet.
     ///
     /// # Errors
     /// In words: it cannot begin so.
-    pub fn reset(
-        &mut self,
+    pub(in crate::serve::core) fn judge_reset(
+        &self,
         plan: &EstimationSettings,
         beginning: Beginning,
-    ) -> Result<&'static str, String> {
+    ) -> Result<Promise, String> {
         let filter = self.estimator.filter();
         let is_level = filter.is_some_and(|filter| filter.is_started());
         let has_field = filter.is_some_and(|filter| filter.has_field());
@@ -74,9 +81,14 @@ impl SensorStream {
                 "the orientation in its next sample",
             ),
         };
-        self.resetting.pending = Some(asked);
+        Ok(Promise { asked, from })
+    }
+
+    /// The attitude begins so with the next sample; what was learned of the sensor is kept. Says where it will begin.
+    pub(in crate::serve::core) fn promise(&mut self, promise: Promise) -> &'static str {
+        self.resetting.pending = Some(promise.asked);
         self.resetting.taken += 1;
-        Ok(from)
+        promise.from
     }
 
     /// Resets, if asked, before the sample `next` is integrated.

@@ -106,9 +106,59 @@ fn exposition(hub: &Hub) -> String {
             label(sensor.id())
         );
     });
+    attitudes(&mut out, hub, family);
     findings(&mut out, hub, family);
     outgoing::exposition(&mut out, hub.outgoing());
     out
+}
+
+/// Age, rate and uncertainty of each sensor: what an alert looks at.
+fn attitudes(out: &mut String, hub: &Hub, family: impl Fn(&mut String, &str, &str, &str)) {
+    family(
+        out,
+        "sensor_age_seconds",
+        "gauge",
+        "Seconds since something of a sensor came, in steps of a quarter of a second.",
+    );
+    hub.each_age(|id, secs| {
+        let _ = writeln!(
+            out,
+            "strapd_sensor_age_seconds{{id=\"{}\"}} {secs}",
+            label(id)
+        );
+    });
+    family(
+        out,
+        "sensor_rate_hertz",
+        "gauge",
+        "Ordinary rate of a sensor by its stamps; the rate that comes is rate(strapd_sensor_samples_total).",
+    );
+    hub.each_sensor(|sensor| {
+        if let Some(step) = sensor.conditioning().spacing_nanos.filter(|n| *n > 0) {
+            let id = label(sensor.id());
+            let _ = writeln!(
+                out,
+                "strapd_sensor_rate_hertz{{id=\"{id}\"}} {}",
+                1e9 / step as f64
+            );
+        }
+    });
+    family(
+        out,
+        "sensor_sigma_degrees",
+        "gauge",
+        "One sigma of tilt and heading of a sensor that gravity corrects, as in STATUS.",
+    );
+    hub.each_sensor(|sensor| {
+        let id = label(sensor.id());
+        let sigmas = sensor.sigma_degrees().into_iter().flatten();
+        for (of, sigma) in ["tilt", "heading"].into_iter().zip(sigmas) {
+            let _ = writeln!(
+                out,
+                "strapd_sensor_sigma_degrees{{id=\"{id}\",of=\"{of}\"}} {sigma}"
+            );
+        }
+    });
 }
 
 /// Number of findings that `STATUS` has of each sensor, by severity.

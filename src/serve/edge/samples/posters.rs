@@ -145,11 +145,17 @@ impl Poster {
                 Ok(Posted::Reset(mut asked)) => {
                     self.publish(&mut run, usize::MAX, received, &mut taken)
                         .await;
-                    if let Ok(asked) = &mut asked {
-                        asked.id = asked.id.take().or(name.map(str::to_owned));
+                    if let Ok(wire::Reset {
+                        sensors: wire::Sensors::One(id),
+                        ..
+                    }) = &mut asked
+                    {
+                        *id = id.take().or(name.map(str::to_owned));
                     }
                     match self.hub.reset(asked, Asker::Client(self.client.number)) {
-                        Ok(_) => (in_a_row, taken.resets) = (0, taken.resets + 1),
+                        Ok((_, done)) => {
+                            (in_a_row, taken.resets) = (0, taken.resets + done.len() as u64);
+                        }
                         Err(fault) => taken.fault(&self.hub, &fault, number, near),
                     }
                 }

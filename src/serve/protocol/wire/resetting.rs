@@ -5,19 +5,31 @@ use crate::config::parse_initial;
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::json;
+use std::collections::BTreeSet;
 use strapd_attitude::estimate::Initial;
 use strapd_recording::text::printable;
 
 /// Longest text of an initial attitude: four numbers with all their digits, and room.
 const MAX_INIT: usize = 256;
 
-/// A sensor's attitude is to begin anew.
+/// Attitudes of sensors are to begin anew.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reset {
-    /// Id of the sensor; `None` = the one without a name.
-    pub id: Option<String>,
+    /// Sensors that are meant.
+    pub sensors: Sensors,
     /// Beginning of the attitude.
     pub beginning: Beginning,
+}
+
+/// Sensors that a `RESET` is for.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Sensors {
+    /// One, by its id; `None` = the one without a name.
+    One(Option<String>),
+    /// Several, at one instant: all of them, or none.
+    These(BTreeSet<String>),
+    /// Every sensor that there is and that can begin so, at one instant.
+    All,
 }
 
 /// Beginning that is asked for.
@@ -34,15 +46,23 @@ pub enum Beginning {
 #[derive(Deserialize)]
 struct ResetObject {
     id: Option<String>,
+    ids: Option<Vec<String>>,
+    #[serde(default)]
+    all: bool,
     init: Option<String>,
     heading: Option<f64>,
+    #[serde(default)]
+    tare: bool,
 }
 
-impl Reset {
-    /// The sensor's name.
+impl Sensors {
+    /// Id that a fault names; `None` where more than one is meant.
     #[must_use]
-    pub fn sensor(&self) -> &str {
-        self.id.as_deref().unwrap_or(NAMELESS)
+    pub fn only(&self) -> Option<&str> {
+        match self {
+            Sensors::One(id) => Some(id.as_deref().unwrap_or(NAMELESS)),
+            Sensors::These(_) | Sensors::All => None,
+        }
     }
 }
 
@@ -59,8 +79,29 @@ pub(super) fn read(text: &[u8]) -> Result<Reset, Fault> {
         id: id.clone(),
         ..Fault::new("bad_reset", what)
     };
-    let beginning = beginning(asked.init.as_deref(), asked.heading).map_err(bad)?;
-    Ok(Reset { id, beginning })
+    let heading = match (asked.tare, asked.heading) {
+        (true, Some(_)) => {
+            return Err(bad(
+                "`tare` and `heading`: a tare is the heading 0; one of them".to_owned(),
+            ));
+        }
+        (true, None) => Some(0.0),
+        (false, heading) => heading,
+    };
+    let beginning = beginning(asked.init.as_deref(), heading).map_err(bad)?;
+    let sensors = match (asked.ids, asked.all) {
+        (None, false) => Sensors::One(id),
+        (Some(ids), false) if id.is_none() && !ids.is_empty() => {
+            Sensors::These(ids.iter().map(|id| name(id)).collect::<Result<_, _>>()?)
+        }
+        (None, true) if id.is_none() => Sensors::All,
+        _ => {
+            return Err(bad(
+                "`id` of one sensor, `ids` of at least one, or `all`: one of them".to_owned(),
+            ));
+        }
+    };
+    Ok(Reset { sensors, beginning })
 }
 
 /// Reads where it is to begin.
@@ -90,6 +131,22 @@ fn beginning(init: Option<&str>, heading: Option<f64>) -> Result<Beginning, Stri
 
 /// The answer: it is taken, and holds from the sensor's next sample on.
 #[must_use]
-pub fn reset_answer(asked: &Reset, origin: &str) -> Bytes {
-    line(&json!({"class": "RESET", "id": asked.sensor(), "from": origin}))
+pub fn reset_answer(asked: &Reset, done: &[(String, &'static str)]) -> Bytes {
+    match (&asked.sensors, done) {
+        (Sensors::One(_), [(id, from)]) => line(&json!({"class": "RESET", "id": id, "from": from})),
+        _ => {
+            let each = done
+                .iter()
+                .map(|(id, from)| json!({"id": id, "from": from}));
+            line(&json!({"class": "RESET", "sensors": each.collect::<Vec<_>>()}))
+        }
+    }
+}
+
+/// Reads a `RESET` without its class, as it is posted.
+///
+/// # Errors
+/// The fault to answer with.
+pub fn posted_reset(body: &[u8]) -> Result<Reset, Fault> {
+    read(body)
 }
