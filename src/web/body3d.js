@@ -72,6 +72,7 @@ export class Scene {
     this.context = surface.begin();
     this.camera = camera;
     this.colours = colours;
+    this.names = [];
     this.centre = [surface.width / 2, surface.height / 2];
     this.scale = SCALE * Math.min(surface.width, surface.height);
   }
@@ -195,10 +196,17 @@ export class Scene {
     axes.forEach((axis, n) => this.axis(axis, n, width));
     context.setLineDash([]);
     if (!name) return;
-    const [x, y] = this.project(axes[0].map((v) => 1.1 * v));
+    let [x, y] = this.project(axes[0].map((v) => 1.1 * v));
+    // Of names that would lie on each other the first is written.
+    const isLeft = x < this.centre[0];
+    if (this.names.some((other) => Math.abs(other.y - y) < 13 && (other.isLeft === isLeft || Math.abs(other.x - x) < 120))) return;
+    this.names.push({ x, y, isLeft });
     context.font = `600 11px ${FONT}`;
-    context.textAlign = x < this.centre[0] ? "right" : "left";
+    context.textAlign = isLeft ? "right" : "left";
     context.textBaseline = "middle";
+    // Not beyond the border.
+    const { width: long } = context.measureText(name);
+    x = isLeft ? Math.max(x, long + 3) : Math.min(x, 2 * this.centre[0] - long - 3);
     context.lineWidth = 3;
     context.strokeStyle = colours.surface;
     context.strokeText(name, x, y);

@@ -1,24 +1,27 @@
 // All sensors in a table: sorted by any column, who is silent last. From STATUS, and a few attitudes a second.
 
-import { fixed, plain, say, whole } from "./numbers.js";
+import { fixed, meaning, plain, say, sigma, whole } from "./numbers.js";
+import { Twice } from "./known.js";
 import { angleBetween, DEGREES, rollPitchYaw } from "./quaternion.js";
 import { taken } from "./sensor.js";
 
 const REDRAWN = 500;
-const degrees = (of, digits) => ({ of, say: (value) => fixed(value, digits) });
+// No more digits than the sigma of the row leaves, and no more than `most`.
+const degrees = (of, most) => ({ of, say: (value, row) => fixed(value, Math.min(most, meaning(row.sigma))) });
 const count = (of) => ({ of, say: (value) => (value === undefined ? "–" : whole(value)), isCount: true });
 
 // Columns by name: a value to sort by, and its words. NaN and undefined are last.
 const COLUMNS = {
   sensor: { of: (row) => row.id, say: plain },
   state: { of: (row, now) => row.state(now)[1], say: (value, row, now) => row.state(now)[0] },
+  age: { of: (row, now) => row.age(now), say: (value) => (Number.isFinite(value) ? (value < 10 ? fixed(value, 1) : whole(Math.floor(value))) : "–") },
   rate: { of: (row) => row.rate, say: (value) => (Number.isFinite(value) ? `${whole(Math.round(value))}` : "–") },
   roll: degrees((row) => row.angles[0], 1),
   pitch: degrees((row) => row.angles[1], 1),
   yaw: degrees((row) => row.angles[2], 1),
   speed: degrees((row) => row.speed, 1),
-  sigma: degrees((row) => row.sigma, 2),
-  error: degrees((row) => row.error, 3),
+  sigma: { of: (row) => row.sigma, say: sigma },
+  error: { of: (row) => row.error, say: (value) => fixed(value, Math.min(3, meaning(value) + 1)) },
   gaps: count((row) => row.source?.gaps),
   lost: count((row) => row.source?.lost),
 };
@@ -54,17 +57,22 @@ class Row {
     if (!att.status?.includes("last")) this.heardAt = now;
   }
 
+  // Seconds since an attitude came.
+  age(now) {
+    return Math.max(0, now - this.heardAt) / 1000;
+  }
+
   // In words, and by what it is sorted.
   state(now) {
     if (!this.q) return ["no data", Infinity];
     if (!Number.isFinite(this.heardAt)) return ["ended", 1e9];
-    const ago = (now - this.heardAt) / 1000;
+    const ago = this.age(now);
     return ago < 5 ? ["live", 0] : [`silent ${whole(Math.floor(ago))} s`, ago];
   }
 }
 
 export class Fleet {
-  // does: choose(id, on | "alone"), shown(id), isSilent(id), moved().
+  // does: zero(), choose(id, on | "alone"), shown(id), isSilent(id), moved().
   constructor(parts, does) {
     this.parts = parts;
     this.does = does;
@@ -76,6 +84,9 @@ export class Fleet {
     for (const button of parts.fleetHead.querySelectorAll("button")) {
       button.addEventListener("click", () => this.sort(button.dataset.sort));
     }
+    this.zero = new Twice(parts.fleetZero, does.zero);
+    this.zero.name("Yaw zero, all");
+    parts.fleetSearch.addEventListener("input", () => this.sort(null));
     parts.fleetFold.addEventListener("click", () => {
       this.isFolded = !this.isFolded;
       this.drawnAt = -Infinity;
@@ -137,9 +148,11 @@ export class Fleet {
     this.drawnAt = now;
     const truth = this.rows.get("truth");
     const order = this.order;
+    const wanted = parts.fleetSearch.value.trim().toLowerCase();
     const silent = order.filter((each) => each.silent).length;
     parts.fleetFold.hidden = silent === 0;
     parts.fleetFold.setAttribute("aria-expanded", String(!this.isFolded));
+    parts.fleetZero.hidden = !order.some(({ row }) => row.source?.resets !== undefined && row.source?.attitude?.aided === "gravity");
     say(parts.fleetFold, `${silent} silent`);
     say(parts.fleetTitle, `${this.rows.size} sensors`);
     parts.fleetHead.querySelector("[data-column=error]").hidden = !truth;
@@ -152,7 +165,7 @@ export class Fleet {
       // Moved where it must be, and only then: a focus is not lost.
       if (row.element === at) at = at.nextElementSibling;
       else parts.fleetBody.insertBefore(row.element, at);
-      row.element.hidden = isSilent && this.isFolded;
+      row.element.hidden = (isSilent && this.isFolded) || !plain(row.id).toLowerCase().includes(wanted);
       if (row.element.hidden) continue;
       row.error = near(row, truth) ? angleBetween(truth.q, row.q) * DEGREES : NaN;
       row.cells.error.hidden = !truth;

@@ -26,6 +26,10 @@ export function listen(parts, does) {
     event.preventDefault();
     KEYS[event.key]();
   });
+  parts.menu.addEventListener("click", () => {
+    const isOpen = document.body.classList.toggle("opened");
+    parts.menu.setAttribute("aria-expanded", String(isOpen));
+  });
   parts.pause.addEventListener("click", does.pause);
   parts.zero.addEventListener("click", does.zeroYaw);
   parts.reset.addEventListener("click", does.reset);

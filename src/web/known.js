@@ -1,7 +1,7 @@
 // What a daemon knows of an attitude and of its sensor beside the numbers: tilt and heading with their sigmas, the
 // calibration it has learned, rest, the magnetic field. Once a second, from STATUS.
 
-import { fixed, say, show } from "./numbers.js";
+import { fixed, say, show, sigma as asSigma } from "./numbers.js";
 import { DEGREES } from "./quaternion.js";
 import { FONT } from "./surface.js";
 
@@ -25,7 +25,7 @@ const ROWS = [
 const list = (value) => (Array.isArray(value) ? value : [value]);
 
 // A button that acts at its second click: one is easily made, and every reader of the sensor sees the attitude jump.
-class Twice {
+export class Twice {
   constructor(button, act) {
     this.button = button;
     button.addEventListener("click", () => {
@@ -91,8 +91,8 @@ export class Known {
     say(parts.aided, attitude.aided ? (by[attitude.aided] ?? attitude.aided) : given);
     parts.aided.classList.toggle("bad", !attitude.aided);
     say(parts.rest, attitude.rest ? "at rest" : "moving");
-    show(parts.tiltSigma, sigma.tilt ?? NaN, 2);
-    show(parts.headingSigma, sigma.heading ?? NaN, 2);
+    show(parts.tiltSigma, sigma.tilt ?? NaN, asSigma);
+    show(parts.headingSigma, sigma.heading ?? NaN, asSigma);
     say(parts.corrections, (aid.corrections ?? 0).toLocaleString("en").replaceAll(",", "\u2009"));
     parts.fieldBox.hidden = !field;
     if (field) {

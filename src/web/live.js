@@ -58,6 +58,7 @@ cards = new Cards({ parts, view, clocks, only }, {
 });
 const together = new Together(parts.together, touch);
 const fleet = new Fleet(parts, {
+  zero: () => link?.send({ class: "RESET", all: true, heading: 0 }),
   choose: (id, on) => {
     cards.choose(id, on);
     fleet.sort(null);
@@ -141,7 +142,8 @@ function heard(message) {
       cards.arrange(!playback.isThere && !paused);
       break;
     case "RESET":
-      notice(`${plain(message.id)} begins anew: ${message.from}`);
+      if (message.sensors) notice(`${message.sensors.length} sensors begin anew: ${message.sensors[0]?.from}`);
+      else notice(`${plain(message.id)} begins anew: ${message.from}`);
       break;
     case "PLAYBACK":
       played(message);
@@ -235,6 +237,9 @@ function draw(now) {
     seen(some);
   });
   parts.live.hidden = view.isLive;
+  // One of each: where a sensor itself can be zeroed the view need not be, and a recording is paused by its own button.
+  parts.zero.hidden = cards.all.some((some) => !some.parts.yawZero.hidden);
+  parts.pause.hidden = playback.isThere;
   fleet.draw(now);
   if (!parts.fleet.hidden) together.draw(cards.all, view, colours);
 }

@@ -6,9 +6,22 @@ export function fixed(value, digits) {
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
+// Digits after the point that mean something beside a sigma: none of an angle under a sigma of 2 degrees.
+export const meaning = (sigma, most = 4, unknown = 2) =>
+  sigma > 0 ? Math.max(0, Math.min(most, -Math.floor(Math.log10(sigma) + 1e-9))) : unknown;
+
+// A sigma: two digits of one below 10.
+export const sigma = (value) => fixed(value, value >= 10 ? 0 : meaning(value) + 1);
+
+// An angle that is an error: three digits, however small it is.
+export function error(value) {
+  if (!(Math.abs(value) < 1e-4) || value === 0) return fixed(value, Math.min(4, meaning(Math.abs(value), 4, 0) + 2));
+  return value.toExponential(1).replaceAll("-", "−");
+}
+
 // Into a <data> element: what is read, and all of its digits.
 export function show(element, value, digits) {
-  const text = fixed(value, digits);
+  const text = typeof digits === "function" ? digits(value) : fixed(value, digits);
   if (element.textContent !== text) element.textContent = text;
   const whole = Number.isFinite(value) ? String(value) : "";
   if (element.value !== whole) element.value = whole;

@@ -35,7 +35,7 @@ export class Together {
       if (!q) return;
       const up = upright(sensor.world);
       const letters = [...plain(id)];
-      const name = letters.length > LONGEST ? `${letters.slice(0, LONGEST - 1).join("")}…` : letters.join("");
+      const name = letters.length > LONGEST ? `${letters.slice(0, LONGEST / 2 - 1).join("")}…${letters.slice(-LONGEST / 2).join("")}` : letters.join("");
       scene.triad((v) => up(rotate(q, v)), { width: 2, dash: DASHES[n % DASHES.length], name });
       drawn.push(plain(id));
     });

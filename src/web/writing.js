@@ -1,7 +1,7 @@
 // What a card says in words and numbers.
 
 import { clockTime } from "./clock.js";
-import { fixed, measure, plain, say, SECONDS, show, whole } from "./numbers.js";
+import { error, fixed, meaning, measure, plain, say, SECONDS, show, sigma as asSigma, whole } from "./numbers.js";
 import { rollPitchYaw } from "./quaternion.js";
 import { taken } from "./sensor.js";
 
@@ -22,22 +22,32 @@ function moment({ sensor, held, shown }) {
   return { ...newest, q: last.q, angle: rollPitchYaw(last.q), sigma, seq: last.seq, error: sensor.error, isHeld: false };
 }
 
+// One sigma of tilt and of heading, as far as they are known: of the attitude itself, else as STATUS tells.
+function sigmas({ known }, { sigma, isHeld }) {
+  const { tilt, heading } = (isHeld ? null : known.attitude?.sigma_deg) ?? {};
+  const own = Math.max(...sigma);
+  return [tilt ?? own, heading ?? own];
+}
+
 export function writeNumbers(card, heading) {
   const { parts, sensor, view } = card;
   const { last } = sensor;
   const now = moment(card);
   const angles = now.isHeld ? rollPitchYaw(now.q) : now.angle;
-  for (const name of ["w", "x", "y", "z"]) show(parts[`q${name}`], now.q[name], 9);
-  show(parts.roll, angles[0], 4);
-  show(parts.pitch, angles[1], 4);
-  show(parts.yaw, view.yaw ? heading : angles[2], 4);
+  const [tilt, north] = sigmas(card, now);
+  // A sigma of degrees, in quaternions: half of it in radians.
+  const digits = meaning(Math.min(tilt, north) / 115, 6, 4);
+  for (const name of ["w", "x", "y", "z"]) show(parts[`q${name}`], now.q[name], Math.max(3, digits));
+  show(parts.roll, angles[0], meaning(tilt));
+  show(parts.pitch, angles[1], meaning(tilt));
+  show(parts.yaw, view.yaw ? heading : angles[2], meaning(north));
   say(parts.yawName, view.yaw ? "yaw, zeroed" : "yaw");
   card.element.classList.toggle("zeroed", view.yaw !== 0);
   for (const [n, name] of ["x", "y", "z"].entries()) {
-    show(parts[`rate${name}`], now.rate[n], 3);
-    show(parts[`sigma${name}`], now.sigma[n], 3);
+    show(parts[`rate${name}`], now.rate[n], 2);
+    show(parts[`sigma${name}`], now.sigma[n], asSigma);
   }
-  show(parts.speed, Math.hypot(...now.rate), 3);
+  show(parts.speed, Math.hypot(...now.rate), 2);
   say(parts.seq, whole(now.seq));
   parts.seq.value = String(now.seq);
   say(parts.stamp, clockTime(now.time, 3));
@@ -47,9 +57,9 @@ export function writeNumbers(card, heading) {
   say(parts.held, card.held ? `at ${clockTime(now.time, 3)}` : "");
   say(parts.frame, `${sensor.bodyAxes} → ${sensor.world}`);
   if (card.against) {
-    show(parts.error, now.error, 6);
-    show(parts.worst, card.errors().worst, 6);
-    show(parts.rms, card.errors().rms, 6);
+    show(parts.error, now.error, error);
+    show(parts.worst, card.errors().worst, error);
+    show(parts.rms, card.errors().rms, error);
   }
   const [from, to] = card.span();
   const part = sensor.whole ? sensor.drawn([from, to]).thinning(from, to) : sensor.thinning;

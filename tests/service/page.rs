@@ -10,6 +10,7 @@ mod drawing;
 mod fleet;
 mod known;
 mod late;
+mod layout;
 mod live_numbers;
 mod looking;
 mod model_top;

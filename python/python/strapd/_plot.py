@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 #: Points of a line: more than a screen has.
 POINTS = 4000
-#: Told apart by everybody (Okabe and Ito).
-COLOURS = ("#0072B2", "#D55E00", "#009E73")
+#: Colours of roll (x), pitch (y) and yaw (z), as on the page and in reports (docs/page.md, "Colours"): told apart by everybody.
+COLOURS = ("#D55E00", "#009E73", "#0072B2")
 #: Sigmas of the bands.
 SIGMAS = 3
 

@@ -88,6 +88,15 @@ fn the_page_shows_what_the_command_line_says() {
         ),
     );
     let q = wxyz(last);
+    // Digits that the sigma leaves: none after the point from 1 degree on. A quaternion moves by half the angle.
+    let sigmas = last["sigma_deg"].as_array().unwrap().iter();
+    let sigma = sigmas.filter_map(Value::as_f64).fold(0.0, f64::max);
+    assert!(sigma > 0.0, "{last}");
+    let left = |sigma: f64, most: usize| {
+        let digits = -sigma.log10().floor();
+        (digits.max(0.0) as usize).min(most)
+    };
+    let digits = left(sigma / 115.0, 6).max(3);
     for (name, expected) in ["q-w", "q-x", "q-y", "q-z"].into_iter().zip(q) {
         let shown = browser.shown(name);
         assert!(
@@ -95,8 +104,13 @@ fn the_page_shows_what_the_command_line_says() {
             "{name}: {shown}, {expected}"
         );
         let text = browser.text(name).replace('−', "-");
-        assert_eq!(text, format!("{expected:.9}"), "{name} as people read it");
+        assert_eq!(
+            text,
+            format!("{expected:.digits$}"),
+            "{name} as people read it"
+        );
     }
+    let digits = left(sigma, 4);
     for (name, expected) in ["roll", "pitch", "yaw"].into_iter().zip(roll_pitch_yaw(q)) {
         let shown = browser.shown(name);
         assert!(
@@ -104,7 +118,11 @@ fn the_page_shows_what_the_command_line_says() {
             "{name}: {shown}, {expected}"
         );
         let text = browser.text(name).replace('−', "-");
-        assert_eq!(text, format!("{expected:.4}"), "{name} as people read it");
+        assert_eq!(
+            text,
+            format!("{expected:.digits$}"),
+            "{name} as people read it"
+        );
     }
     for (n, name) in ["rate-x", "rate-y", "rate-z"].into_iter().enumerate() {
         let expected = last["rate"][n].as_f64().unwrap().to_degrees();
