@@ -148,6 +148,7 @@ fn main() -> Result<(), Failure> {
                     scale: by,
                     axes: by,
                     force: by,
+                    sensitivity: by,
                 };
             }
             Some(("untruncate", value)) => settings.undo_truncation = value == "1",

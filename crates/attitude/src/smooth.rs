@@ -82,7 +82,7 @@ mod sweep;
 mod tests;
 mod work;
 
-pub(crate) use border::FORCE_SCALE;
+pub(crate) use border::{FORCE_BIAS_SIGMA, FORCE_SCALE};
 pub use error::SmoothError;
 pub use output::Estimate;
 pub use phase::Failure;

@@ -16,7 +16,7 @@ pub(crate) use estimate::rest_at_start;
 pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level};
 pub(crate) use swing::Swing;
 pub(crate) use turns::{
-    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical, is_solely_vertical,
+    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_MOST, SHORT_SECS, about_vertical, is_solely_vertical,
 };
 
 use crate::frames::{Body, In};

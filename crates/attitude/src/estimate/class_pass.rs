@@ -76,8 +76,7 @@ struct Evidence {
 impl ClassPass {
     /// Makes one where the class is to be found.
     pub(super) fn of(plan: &EstimationSettings) -> Option<ClassPass> {
-        // A smoother widens its priors by itself: in six hands its errors are the same, class stated or not.
-        let is_open = plan.noise.is_by_data() && plan.calibration.is_none() && !plan.smooth;
+        let is_open = plan.noise.is_by_data() && plan.calibration.is_none();
         (is_open && plan.aid != Aid::None).then(ClassPass::default)
     }
 

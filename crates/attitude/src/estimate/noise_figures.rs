@@ -96,6 +96,7 @@ impl Noise {
             misalignment: one(misalignment),
             tilt: one(tilt),
             delay: 0.0,
+            sensitivity: 0.0,
         })
     }
 }

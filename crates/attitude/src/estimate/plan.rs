@@ -478,6 +478,8 @@ pub struct Noise {
     pub tilt: f64,
     /// Delay of its filters that nobody has taken out, s.
     pub delay: f64,
+    /// Sensitivity of the gyro to acceleration, rad/s per g; 0: nothing is said.
+    pub sensitivity: f64,
 }
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -501,6 +503,8 @@ pub struct NoisePreset {
     pub tilt: f64,
     /// Delay of its filters that nobody has taken out, s.
     pub delay: f64,
+    /// Sensitivity of the gyro to acceleration, deg/s per g.
+    pub sensitivity: f64,
 }
 
 /// The named classes. One standard deviation is a third of a data sheet's limit, or its typical value.
@@ -509,7 +513,8 @@ pub struct NoisePreset {
 /// offset 20 mg; `uncalibrated`, a cheap chip on a board that nobody has measured: InvenSense MPU-6050, scale 3 %,
 /// cross-axis 2 %, offset 50 mg, and 1 degree to its case; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %,
 /// misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h, 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm,
-/// 10 arc seconds, 25 ug). Delays: of a chip's default filters; the better the class, the better it is stated and
+/// 10 arc seconds, 25 ug). Sensitivities to acceleration: BMI088 and MPU-6050 0.1 deg/s per g, an Xsens MTi 0.006,
+/// ADIS16465 0.009, STIM300 1 deg/h per g. Delays: of a chip's default filters; the better the class, the better it is stated and
 /// taken out.
 pub const NOISE_PRESETS: [NoisePreset; 5] = [
     NoisePreset {
@@ -521,6 +526,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         misalignment: 5e-3,
         tilt: 0.02,
         delay: 2e-3,
+        sensitivity: 0.006,
     },
     NoisePreset {
         name: "uncalibrated",
@@ -531,6 +537,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         misalignment: 0.012,
         tilt: 0.02,
         delay: 2e-3,
+        sensitivity: 0.1,
     },
     NoisePreset {
         name: "industrial",
@@ -541,6 +548,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         misalignment: 1.5e-3,
         tilt: 1.4e-3,
         delay: 1e-3,
+        sensitivity: 0.006,
     },
     NoisePreset {
         name: "tactical",
@@ -551,6 +559,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         misalignment: 1e-3,
         tilt: 7.5e-4,
         delay: 5e-4,
+        sensitivity: 3e-4,
     },
     NoisePreset {
         name: "navigation",
@@ -561,6 +570,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         misalignment: 5e-5,
         tilt: 2.5e-5,
         delay: 1e-4,
+        sensitivity: 1e-5,
     },
 ];
 
@@ -624,6 +634,7 @@ impl Noise {
             misalignment: class.misalignment,
             tilt: class.tilt,
             delay: class.delay,
+            sensitivity: class.sensitivity * DEG,
         }
     }
 

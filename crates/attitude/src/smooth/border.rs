@@ -7,21 +7,23 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.
 pub(super) const GYRO: usize = 0;
+/// Gyro's sensitivity to acceleration, rad/s per m/s^2, row by row.
+pub(super) const SENSITIVITY: usize = 9;
 /// Accelerometer: bias, matrix less 1, time offset.
-pub(super) const FORCE_BIAS: usize = 9;
-pub(super) const FORCE: usize = 12;
-pub(super) const FORCE_TIME: usize = 21;
+pub(super) const FORCE_BIAS: usize = 18;
+pub(super) const FORCE: usize = 21;
+pub(super) const FORCE_TIME: usize = 30;
 /// Centre of the positions.
-pub(super) const CENTRE: usize = 22;
+pub(super) const CENTRE: usize = 31;
 /// Magnetometer: hard iron, matrix less 1; the field's north and up; its time offset; the field while moving.
-pub(super) const IRON: usize = 25;
-pub(super) const FIELD: usize = 28;
-pub(super) const NORTH: usize = 37;
-pub(super) const FIELD_TIME: usize = 39;
-pub(super) const MOVING: usize = 40;
+pub(super) const IRON: usize = 34;
+pub(super) const FIELD: usize = 37;
+pub(super) const NORTH: usize = 46;
+pub(super) const FIELD_TIME: usize = 48;
+pub(super) const MOVING: usize = 49;
 /// Number of unknowns, and without a magnetometer.
-pub(super) const ALL: usize = 43;
-pub(super) const PLAIN: usize = 25;
+pub(super) const ALL: usize = 52;
+pub(super) const PLAIN: usize = 34;
 /// Width of the border's equations: right sides are one more column.
 pub(super) const WIDE: usize = ALL + 1;
 pub(super) const NARROW: usize = PLAIN + 1;
@@ -51,7 +53,12 @@ pub(super) struct Priors {
 
 /// Scales of the accelerometer: of each axis by itself, and what all have in common.
 pub(crate) const FORCE_SCALE: f64 = 0.0015;
+/// Bias of the accelerometer, m/s^2.
+pub(crate) const FORCE_BIAS_SIGMA: f64 = 0.04;
 const FORCE_SHARED: f64 = 0.05;
+
+/// Sensitivity of a calibrated gyro to acceleration, rad/s per m/s^2: 0.006 deg/s per g, as Xsens states of an MTi.
+const GYRO_SENSITIVITY: f64 = 1.07e-5;
 
 /// Hard iron is of this size, uT, or of any (Cauchy's distribution).
 pub(super) const IRON_SCALE: f64 = 1.0;
@@ -59,7 +66,12 @@ pub(super) const IRON_SCALE: f64 = 1.0;
 impl Priors {
     /// Makes it for a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
     pub(super) fn new(settings: &Settings, has_moving_field: bool) -> Priors {
-        let PriorScale { scale, axes, force } = settings.looseness;
+        let PriorScale {
+            scale,
+            axes,
+            force,
+            sensitivity,
+        } = settings.looseness;
         let mut sigma = [0.0; ALL];
         let mut matrix = |first: usize, diagonal: f64, others: f64| {
             for i in 0..9 {
@@ -74,7 +86,8 @@ impl Priors {
         matrix(FORCE, force_own.hypot(force_shared) / scale, 0.001);
         matrix(FIELD, 0.015, 0.008);
         let mut put = |range: std::ops::Range<usize>, value: f64| sigma[range].fill(value);
-        put(FORCE_BIAS..FORCE, 0.04 * force);
+        put(SENSITIVITY..FORCE_BIAS, GYRO_SENSITIVITY * sensitivity);
+        put(FORCE_BIAS..FORCE, FORCE_BIAS_SIGMA * force);
         put(FORCE_TIME..CENTRE, 0.003 * scale);
         put(CENTRE..IRON, 10.0);
         put(IRON..FIELD, 1e3);
@@ -82,7 +95,7 @@ impl Priors {
         put(FIELD_TIME..MOVING, 0.005 * scale);
         put(MOVING..ALL, if has_moving_field { 2.5 } else { 1e-3 });
         let mut information = vec![[0.0; ALL]; ALL];
-        for i in FORCE_BIAS..ALL {
+        for i in SENSITIVITY..ALL {
             information[i][i] = 1.0 / (sigma[i] * sigma[i]);
         }
         // Scales share a part: a clock, a reference voltage. A pair across the diagonal is a share of axes that are

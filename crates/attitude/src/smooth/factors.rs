@@ -186,10 +186,10 @@ pub(super) fn inertial<const W: usize>(
                 for j in 0..3 {
                     row.own[BIAS + j] = -swept.by_turn[r][j];
                 }
-                for j in 0..9 {
-                    row.border[j] = -swept.by_turn[r][3 + j];
+                for (to, from) in row.border.iter_mut().zip(&swept.by_turn[r][3..]) {
+                    *to = -from;
                 }
-                row.span = 9;
+                row.span = border::FORCE_BIAS;
             }
             1 | 2 => {
                 let (by, columns) = match kind {
@@ -275,7 +275,7 @@ pub(super) fn field<const W: usize>(
             row.border[border::IRON + j] =
                 -(0..3).map(|i| means.r[r][i] * matrix[(i, j)]).sum::<f64>();
         }
-        row.border[..9].copy_from_slice(&means.by_turn[r][3..]);
+        row.border[..border::FORCE_BIAS].copy_from_slice(&means.by_turn[r][3..]);
         row.border[border::FIELD..border::NORTH].copy_from_slice(&by_matrix[r]);
         if r > 0 {
             row.border[border::NORTH + r - 1] = -1.0;

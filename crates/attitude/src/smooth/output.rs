@@ -72,7 +72,7 @@ impl Smoothed {
             samples,
             waiting: &waiting,
         };
-        let sensor = Sensor::of(&self.constants);
+        let sensor = Sensor::of(&self.constants, self.survey.force);
         let mut out = Vec::new();
         let mut swept: Vec<[f64; 4]> = Vec::new();
         let mut last = None;
@@ -179,7 +179,7 @@ impl Smoothed {
     ) -> Vector3<f64> {
         let mut q = a.q;
         for sample in held {
-            let w: Vector3<f64> = sensor.gyro * (sample.rate - a.bias);
+            let w = sensor.rate(sample, &a.bias);
             q = turned(&q, &(w * sample.secs));
             swept.push(q);
         }
@@ -195,7 +195,7 @@ impl Smoothed {
         sensor: &Sensor,
     ) -> Estimate {
         let bias = a.bias + (b.bias - a.bias) * share;
-        let rate: Vector3<f64> = sensor.gyro * (sample.rate - bias);
+        let rate = sensor.rate(sample, &bias);
         let mut q = turned_in_navigation(&residual, q);
         if self.settings.sensor_delay != 0.0 {
             q = turned(&q, &(rate * self.settings.sensor_delay));

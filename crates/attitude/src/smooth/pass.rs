@@ -243,7 +243,7 @@ pub(super) fn sweep_all<S: Samples, const W: usize>(
     model: &Model<'_>,
     take: impl FnMut(&Job<W>),
 ) -> Result<(), S::Error> {
-    let sensor = &Sensor::of(model.constants);
+    let sensor = &Sensor::of(model.constants, with.0.force);
     let helpers = with.1.threads.get() - 1;
     let queue = &Queue::<W>::new();
     let (sender, done) = mpsc::channel();

@@ -6,7 +6,7 @@
 
 use super::segments::{STILL_MEAN, STILL_RATE, Segment, median_of, median_rate};
 use crate::condition::stillness::{
-    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_SECS, about_vertical, is_solely_vertical,
+    ALONG, BEYOND_CLASS, FEW_SECS, SAME, SHORT_MOST, SHORT_SECS, about_vertical, is_solely_vertical,
 };
 use nalgebra::Vector3;
 use std::ops::Range;
@@ -164,7 +164,8 @@ pub(super) fn keep_rests(segments: &mut [Segment], bias_sigma: f64) -> Option<Ve
     let secs: f64 = kept.iter().map(|run| run.secs).sum();
     if secs < FEW_SECS {
         let is_rest = |run: &Run| {
-            run.secs >= SHORT_SECS || !run.is_along() && kept.iter().all(|other| run.is_as(other))
+            let is_slow = !run.is_along() && run.along() <= SHORT_MOST;
+            run.secs >= SHORT_SECS || is_slow && kept.iter().all(|other| run.is_as(other))
         };
         let is_rest: Vec<bool> = kept.iter().map(is_rest).collect();
         let mut is_rest = is_rest.into_iter();

@@ -49,6 +49,9 @@ impl<const N: usize> Estimated<N> {
 pub struct Calibration {
     /// G of `rate = (1 + G)(measured - bias)`.
     pub gyro: Estimated<9>,
+    /// Sensitivity of the gyro to the specific force, rad/s per m/s^2, row by row: `measured - bias` holds this times what
+    /// the force differs from its mean over the recording.
+    pub gyro_sensitivity: Estimated<9>,
     /// ba of `force = (1 + A)(measured - ba)`, m/s^2.
     pub force_bias: Estimated<3>,
     /// A.
@@ -100,6 +103,7 @@ impl Calibration {
         let has_field = covariance.len() > border::PLAIN;
         Calibration {
             gyro: Estimated::of(border::GYRO, constants, &sigma, &prior),
+            gyro_sensitivity: Estimated::of(border::SENSITIVITY, constants, &sigma, &prior),
             force_bias: Estimated::of(border::FORCE_BIAS, constants, &sigma, &prior),
             force: Estimated::of(border::FORCE, constants, &sigma, &prior),
             force_time: Estimated::of(border::FORCE_TIME, constants, &sigma, &prior),

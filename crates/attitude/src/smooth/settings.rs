@@ -92,6 +92,8 @@ pub struct PriorScale {
     pub axes: f64,
     /// Ratio for the accelerometer's bias.
     pub force: f64,
+    /// Ratio for the gyro's sensitivity to acceleration.
+    pub sensitivity: f64,
 }
 
 impl Default for PriorScale {
@@ -100,6 +102,7 @@ impl Default for PriorScale {
             scale: 1.0,
             axes: 1.0,
             force: 1.0,
+            sensitivity: 1.0,
         }
     }
 }
@@ -110,6 +113,7 @@ impl PriorScale {
             scale: self.scale * by.scale,
             axes: self.axes * by.axes,
             force: self.force * by.force,
+            sensitivity: self.sensitivity * by.sensitivity,
         }
     }
 }
@@ -181,8 +185,13 @@ impl Settings {
         if !in_range(spacing, 0.05, 60.0) {
             return Some(("node_spacing", spacing));
         }
-        let PriorScale { scale, axes, force } = self.looseness;
-        for looseness in [scale, axes, force] {
+        let PriorScale {
+            scale,
+            axes,
+            force,
+            sensitivity,
+        } = self.looseness;
+        for looseness in [scale, axes, force, sensitivity] {
             if !in_range(looseness, 1e-3, 1e3) {
                 return Some(("looseness", looseness));
             }

@@ -51,6 +51,8 @@ pub(super) struct Survey {
     /// Time from the first to the last without the long breaks, s.
     pub secs: f64,
     pub quantisation: Option<Quantisation>,
+    /// Mean specific force, m/s^2, body axes.
+    pub force: Vector3<f64>,
     /// Fields that came.
     pub fields: u64,
     /// uT by the unit of the field.
@@ -81,6 +83,7 @@ impl Survey {
             interval: first.intervals.median(),
             secs: first.secs,
             quantisation,
+            force: first.force / first.forces.max(1) as f64,
             fields: first.fields.count,
             field_scale: match settings.field_unit {
                 FieldUnit::Microtesla => 1.0,
@@ -108,6 +111,9 @@ struct First {
     last: Option<Numbers>,
     intervals: Intervals,
     differences: Differences,
+    /// Sum and number of the forces.
+    force: Vector3<f64>,
+    forces: u64,
     fields: Sizes,
 }
 
@@ -122,6 +128,10 @@ impl First {
             self.intervals.take(nanos);
             let step = sample.rate - last.rate;
             step.iter().for_each(|d| self.differences.take(d.abs()));
+        }
+        if let Some(force) = &sample.force {
+            self.force += force;
+            self.forces += 1;
         }
         if let Some(field) = &sample.field {
             self.fields.take(field.norm());

@@ -12,10 +12,10 @@ use nalgebra::{Matrix3, Vector3};
 /// Gravity that is assumed, m/s^2.
 pub(super) const GRAVITY: f64 = 9.81;
 
-/// Derivatives that a turn has: by bias, by the gyro's matrix.
-pub(super) const TURN: usize = 12;
+/// Derivatives that a turn has: by bias, by the gyro's matrix, by its sensitivity to acceleration.
+pub(super) const TURN: usize = 21;
 /// Number of columns of velocity and position: those, by the accelerometer's bias, matrix and time offset.
-pub(super) const PUSH: usize = 25;
+pub(super) const PUSH: usize = 34;
 /// Columns of the accelerometer in the loop, and one for alignment.
 const OWN: usize = 14;
 
@@ -23,6 +23,9 @@ const OWN: usize = 14;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sensor {
     pub gyro: Matrix3<f64>,
+    /// Sensitivity to acceleration, rad/s per m/s^2, and the force about which it counts, m/s^2: the bias is that there.
+    pub sensitivity: Matrix3<f64>,
+    pub usual_force: Vector3<f64>,
     pub force_bias: Vector3<f64>,
     pub force: Matrix3<f64>,
     pub force_time: f64,
@@ -32,9 +35,12 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
-    pub(super) fn of(constants: &Constants) -> Sensor {
+    /// Makes it of the constants; `usual_force`: the mean one of the recording, m/s^2, body axes.
+    pub(super) fn of(constants: &Constants, usual_force: Vector3<f64>) -> Sensor {
         Sensor {
             gyro: border::matrix(constants, border::GYRO),
+            sensitivity: border::matrix(constants, border::SENSITIVITY) - Matrix3::identity(),
+            usual_force,
             force_bias: border::vector(constants, border::FORCE_BIAS),
             force: border::matrix(constants, border::FORCE),
             force_time: constants[border::FORCE_TIME],
@@ -42,6 +48,21 @@ impl Sensor {
             field: border::matrix(constants, border::FIELD),
             field_time: constants[border::FIELD_TIME],
         }
+    }
+
+    /// Force that the gyro feels beside the usual one, m/s^2.
+    fn felt(&self, sample: &Prepared) -> Vector3<f64> {
+        sample.force - self.usual_force
+    }
+
+    /// Rate as it was measured, without bias and sensitivity, rad/s.
+    fn less_bias(&self, sample: &Prepared, bias: &Vector3<f64>) -> Vector3<f64> {
+        sample.rate - bias - self.sensitivity * self.felt(sample)
+    }
+
+    /// Rate by the gyro's calibration, rad/s.
+    pub(super) fn rate(&self, sample: &Prepared, bias: &Vector3<f64>) -> Vector3<f64> {
+        self.gyro * self.less_bias(sample, bias)
     }
 }
 
@@ -54,7 +75,7 @@ pub(super) struct Swept {
     pub velocity: [f64; 3],
     pub position: [f64; 3],
     pub secs: f64,
-    /// Derivative by bias (3) and the gyro's matrix (9).
+    /// Derivative by bias (3), the gyro's matrix (9) and its sensitivity (9).
     pub by_turn: [[f64; TURN]; 3],
     /// The same, then by the accelerometer's bias (3), matrix (9), time offset.
     pub by_velocity: [[f64; PUSH]; 3],
@@ -73,7 +94,7 @@ pub(super) struct FieldMeans {
     pub rm: [[f64; 9]; 3],
     /// Derivative by the time offset.
     pub by_time: [f64; 3],
-    /// Derivative by bias and the gyro's matrix.
+    /// Derivative by bias, the gyro's matrix and its sensitivity.
     pub by_turn: [[f64; TURN]; 3],
 }
 
@@ -140,7 +161,8 @@ pub(super) fn sweep<const FIELD: bool>(
     let mut field = FieldMeans::none();
     for sample in samples {
         let dt = sample.secs;
-        let u = sample.rate - bias;
+        let felt = sensor.felt(sample);
+        let u = sensor.less_bias(sample, bias);
         let w: Vector3<f64> = sensor.gyro * u;
         q = turned(&q, &(w * dt));
         let before = r;
@@ -158,6 +180,9 @@ pub(super) fn sweep<const FIELD: bool>(
                 d[i][3 + 3 * j] += mean * u[0];
                 d[i][4 + 3 * j] += mean * u[1];
                 d[i][5 + 3 * j] += mean * u[2];
+                d[i][12 + 3 * j] += mean * felt[0];
+                d[i][13 + 3 * j] += mean * felt[1];
+                d[i][14 + 3 * j] += mean * felt[2];
             }
         }
         push_by_turn(&d, &f, dt, &mut dv, &mut dp);
@@ -257,6 +282,12 @@ fn by_bias(mut d: [[f64; TURN]; 3], gyro: &Matrix3<f64>) -> [[f64; TURN]; 3] {
         let bare = Vector3::new(row[0], row[1], row[2]);
         let by: [f64; 3] = (-(gyro.transpose() * bare)).into();
         row[..3].copy_from_slice(&by);
+        // A sensitivity is a bias by the share of the force.
+        for l in 0..3 {
+            let bare = Vector3::new(row[12 + l], row[15 + l], row[18 + l]);
+            let by = -(gyro.transpose() * bare);
+            (row[12 + l], row[15 + l], row[18 + l]) = (by.x, by.y, by.z);
+        }
     }
     d
 }

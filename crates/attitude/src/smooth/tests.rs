@@ -5,5 +5,6 @@ mod input;
 mod logs;
 mod planar;
 mod robustness;
+mod sensitivity;
 mod slopes;
 mod spans;

@@ -370,7 +370,7 @@ impl Work {
         samples: &mut S,
         nodes: &[Node],
     ) -> Result<Vec<Option<[f64; 3]>>, S::Error> {
-        let sensor = Sensor::of(&[0.0; ALL]);
+        let sensor = Sensor::of(&[0.0; ALL], self.survey.force);
         let mut fields = Vec::with_capacity(self.segments.len());
         by_segment(samples, self.with(), &self.segments, |k, held| {
             let Some(k) = k else { return };

@@ -7,6 +7,9 @@ use strapd_attitude::estimate::Recording;
 use strapd_attitude::setting::{NOISE, SMOOTH};
 use strapd_attitude::smooth::{Bias, Calibration, Counts, Estimated, HeldBias, Outcome, Sizes};
 
+/// Degrees a second for each g in one radian a second for each m/s^2.
+const DEG_S_PER_G: f64 = 57.295_779_513 * 9.806_65;
+
 /// A recording that was smoothed.
 #[derive(Clone, Debug)]
 pub struct Smoothing {
@@ -217,6 +220,10 @@ impl Smoothing {
         let m = c.magnetometer.as_ref();
         let all = [
             part("gyro scale and axes", Some(&c.gyro)),
+            part(
+                "gyro sensitivity to acceleration",
+                Some(&c.gyro_sensitivity),
+            ),
             part("accelerometer bias", Some(&c.force_bias)),
             part("accelerometer scale and axes", Some(&c.force)),
             part("accelerometer lead", Some(&c.force_time)),
@@ -261,6 +268,10 @@ impl Smoothing {
             String::new(),
         ]];
         matrix("gyro", &c.gyro, &mut rows);
+        for (axis, places) in [("x", [0, 1, 2]), ("y", [3, 4, 5]), ("z", [6, 7, 8])] {
+            let name = format!("gyro {axis} by acceleration, deg/s per g");
+            rows.push(row(&name, &c.gyro_sensitivity, places, DEG_S_PER_G));
+        }
         rows.push(row(
             "accelerometer bias, m/s^2",
             &c.force_bias,
@@ -358,6 +369,7 @@ impl Smoothing {
                 "last": self.last_bias.0, "last_sigma": self.last_bias.1,
             },
             "G": numbers(&c.gyro),
+            "gyro_sensitivity": numbers(&c.gyro_sensitivity),
             "ba": numbers(&c.force_bias),
             "A": numbers(&c.force),
             "lead": numbers(&c.force_time),

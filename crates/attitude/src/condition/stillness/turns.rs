@@ -21,6 +21,9 @@ pub(crate) const BEYOND_CLASS: f64 = 1.5;
 pub(crate) const FEW_SECS: f64 = 10.0;
 /// And these are the short ones, s.
 pub(crate) const SHORT_SECS: f64 = 1.4;
+/// A short one is believed up to this rate along its vertical, rad/s, whatever is across: who starts in a slow turn
+/// rests as quietly, and a bias so large is seldom.
+pub(crate) const SHORT_MOST: f64 = 1.5_f64.to_radians();
 /// Rates of one bias differ by no more than this and three of their sigmas, rad/s.
 pub(crate) const SAME: f64 = 0.002;
 
@@ -121,10 +124,17 @@ impl Rests {
     pub fn less_turns(&self, class: f64) -> (Rests, Option<Diagnostic>) {
         let is_few = self.secs < FEW_SECS;
         let is_short = |rest: &Rest| is_few && rest.secs() < SHORT_SECS;
+        let is_fast = |rest: &Rest| {
+            let along = rest.along(&rest.mean_rate.0);
+            is_short(rest) && along.is_some_and(|along| along.abs() > SHORT_MOST)
+        };
         let is_sole = |rest: &Rest| !self.has_moved && rest.is_solely_vertical();
         let is_turn = |rest: &Rest| {
             let turn = rest.turn().map(f64::abs);
-            turn.is_some_and(|turn| turn > BEYOND_CLASS * class || is_short(rest) || is_sole(rest))
+            is_fast(rest)
+                || turn.is_some_and(|turn| {
+                    turn > BEYOND_CLASS * class || is_short(rest) || is_sole(rest)
+                })
         };
         let (mut turns, mut kept): (Vec<Rest>, Vec<Rest>) =
             self.kept.iter().partition(|r| is_turn(r));

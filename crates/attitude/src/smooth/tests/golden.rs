@@ -10,7 +10,7 @@ use crate::smooth::prepared::Prepared;
 use crate::smooth::segments::{Cutter, find_standstill};
 use crate::smooth::survey::Survey;
 use crate::smooth::sweep::{Sensor, sweep};
-use crate::smooth::{MotionModel, Outcome, Sample, Settings, Smoothed};
+use crate::smooth::{MotionModel, Outcome, PriorScale, Sample, Settings, Smoothed};
 use nalgebra::Vector3;
 
 /// Half of the last digit of six.
@@ -23,6 +23,11 @@ fn settings() -> Settings {
         has_unresolved: false,
         iterations: 12,
         field_iterations: 16,
+        // The figures have no such constant.
+        looseness: PriorScale {
+            sensitivity: 1e-3,
+            ..PriorScale::default()
+        },
         ..Settings::default()
     }
 }
@@ -92,7 +97,7 @@ fn a_segment_is_swept_as_in_the_figures() {
     let (_, prepared) = prepared(&hand.samples, &settings());
     let mut constants = [0.0; ALL];
     constants[border::FORCE_BIAS..border::FORCE].copy_from_slice(&FORCE_BIAS);
-    let sensor = Sensor::of(&constants);
+    let sensor = Sensor::of(&constants, Vector3::zeros());
     let swept = sweep::<true>(
         &prepared[3001..=3050],
         &hand.truth[3000],
@@ -106,10 +111,10 @@ fn a_segment_is_swept_as_in_the_figures() {
         -0.190510, -0.440226, 0.099669, 0.269949, -0.041745, -0.002951, 0.624089, -0.095572,
         -0.005201, -0.134316, 0.033633, 0.023156,
     ];
-    agree(&swept.by_turn[0], &turn, DIGITS);
+    agree(&swept.by_turn[0][..12], &turn, DIGITS);
     let velocity = [-0.771776, 0.421774, 1.024747, 1.121921, -0.119577, 0.078771];
     agree(&swept.by_velocity[0][..6], &velocity, DIGITS);
-    agree(&swept.by_velocity[0][24..], &[4.572860], DIGITS);
+    agree(&swept.by_velocity[0][33..], &[4.572860], DIGITS);
     let position = [
         0.003122, -0.019132, -0.013812, -0.004578, 0.000402, -0.000468,
     ];

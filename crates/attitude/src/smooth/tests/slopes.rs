@@ -75,7 +75,7 @@ impl Place {
             &self.samples,
             &self.nodes[0].q,
             &self.nodes[0].bias,
-            &Sensor::of(&self.constants),
+            &Sensor::of(&self.constants, Vector3::new(1.0, -2.0, 9.0)),
         )
     }
 
