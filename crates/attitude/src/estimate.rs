@@ -27,6 +27,7 @@ mod magnetometer_watch;
 mod meaning;
 mod memory;
 mod noise_figures;
+mod noise_presets;
 mod open_kind;
 mod orientation_lag;
 mod output_frame;
@@ -38,6 +39,7 @@ mod sensor_calibration;
 pub mod settings;
 mod settings_fingerprint;
 mod smoothing;
+mod smoothing_priors;
 mod stamps;
 
 pub use aiding::{Aiding, Forces};
@@ -52,11 +54,9 @@ pub use lag::OrientationLag;
 pub use meaning::{Meaning, orientation_convention};
 pub use memory::Memory;
 pub use noise_figures::{NOISE_FIGURES, NoiseFigure};
+pub use noise_presets::{NOISE_PRESETS, NoisePreset};
 pub use orientation_lag::LagPass;
-pub use plan::{
-    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, Mended, NOISE_PRESETS, Noise,
-    NoisePreset, Truncation,
-};
+pub use plan::{Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, Mended, Noise, Truncation};
 pub use pooled::Pooled;
 pub use preparation::{Patience, Preparation, Prepared, at_once};
 pub use sample_kind::{KindChoice, KindReason};

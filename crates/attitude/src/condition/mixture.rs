@@ -32,7 +32,7 @@ const GRAVITY: [f64; 3] = [9.806_65, 1.0, 1000.0];
 const NEAR_GRAVITY: f64 = 0.06;
 const SHORTER: f64 = 2.0;
 const SHORTER_BY: f64 = 0.02;
-/// Of the last 16 windows worth a look so many show two groups before that is reported, for so long, ns.
+/// Number of the last 16 windows worth a look that show two groups before that is reported, and for how long, ns.
 const ENOUGH: u32 = 10;
 const LONG_ENOUGH: i64 = 2_000_000_000;
 

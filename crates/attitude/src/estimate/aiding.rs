@@ -4,7 +4,8 @@
 //! specific force (phones export acceleration without gravity) would level to anything.
 
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, EstimationSettings, Initial, NOISE_PRESETS, Noise};
+use super::noise_presets::NOISE_PRESETS;
+use super::plan::{Aid, EstimationSettings, Initial, Noise};
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;

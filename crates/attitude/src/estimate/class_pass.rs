@@ -6,7 +6,8 @@
 use super::aiding::Aiding;
 use super::first_pass::MANY;
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::plan::{Aid, EstimationSettings, NOISE_PRESETS, Noise, NoisePreset};
+use super::noise_presets::{NOISE_PRESETS, NoisePreset};
+use super::plan::{Aid, EstimationSettings, Noise};
 use crate::aid::{AidedPropagator, Calibration, Settings};
 use crate::condition::{self, Clock, CoarseClock, Conditioner};
 use crate::diagnostic::Diagnostic;

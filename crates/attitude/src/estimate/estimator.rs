@@ -13,11 +13,12 @@ use super::meaning::Meaning;
 use super::memory::Memory;
 use super::open_kind::{Event, OpenKind};
 use super::output_frame::{OutputFrame, turned_north};
-use super::plan::{EstimationSettings, Initial, NOISE_PRESETS, Noise};
+use super::plan::{EstimationSettings, Initial, Noise};
 use super::preparation::{Prepared, is_causal};
 use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
+use super::smoothing_priors::looseness;
 use crate::aid::{self, AidedPropagator};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
@@ -25,20 +26,10 @@ use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
-use crate::smooth::{FORCE_BIAS_SIGMA, PriorScale, PriorSigmas};
+use crate::smooth::PriorSigmas;
 
 /// Samples at once that memory is kept for.
 const FEW: usize = 8;
-
-/// Ratio of the smoother's prior of the accelerometer's bias to its own, for a class with this sigma of it, m/s^2: a
-/// worse class adds what it has more than the usual one.
-fn force_ratio(class: f64) -> f64 {
-    let usual = aid::Settings::default().force_bias_prior;
-    if class <= usual {
-        return class / usual;
-    }
-    (FORCE_BIAS_SIGMA.powi(2) + class.powi(2) - usual.powi(2)).sqrt() / FORCE_BIAS_SIGMA
-}
 
 /// An estimator of one stream.
 #[derive(Debug)]
@@ -193,22 +184,12 @@ impl Estimator {
                             aid::Start::Level | aid::Start::LevelBy(_) => None,
                             aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
                         };
-                        let usual = aid::Settings::default();
-                        let usual_noise = Noise::preset(&NOISE_PRESETS[0]);
                         let told = SmoothingInputs {
                             kind: resolved.kind,
                             heading,
-                            looseness: PriorScale {
-                                scale: aiding.settings.scale_prior / usual.scale_prior,
-                                axes: aiding.settings.cross_prior / usual.cross_prior,
-                                force: force_ratio(aiding.settings.force_bias_prior),
-                                sensitivity: match prepared.noise.sensitivity {
-                                    0.0 => 1.0,
-                                    stated => stated / usual_noise.sensitivity,
-                                },
-                            },
+                            looseness: looseness(&aiding.settings, &prepared.noise),
                             is_class_found: plan.noise.is_by_data()
-                                && prepared.noise != usual_noise,
+                                && prepared.noise != plan.noise.taken(),
                             bias_sigma: prepared.noise.bias_of_class(),
                             gyro_range: aiding.settings.gyro_range,
                             known: PriorSigmas {

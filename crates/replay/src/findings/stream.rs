@@ -1,4 +1,4 @@
-//! What a stream shows to be no single sensor in one unit -> findings: two that take turns, a unit that changes. Pure.
+//! Evidence that a stream is no single sensor in one unit -> findings: two that take turns, a unit that changes. Pure.
 //!
 //! Apart from the counts of a run because the advice depends on who reads it: a recording is split, a sender is mended.
 

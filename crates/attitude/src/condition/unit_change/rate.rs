@@ -21,7 +21,7 @@ const UNITS: [f64; 3] = [
 /// Logarithm of a window's ratio by the usual that may be another unit's, and the largest of a right one.
 const JUMPS: f64 = 1.8;
 const RIGHT: f64 = 2.2;
-/// How far the logarithm of the jump of the ratio, and that of the rates, may be from that of two units.
+/// Largest distance of the logarithm of the ratio's jump, and of that of the rates, from that of two units.
 const NEAR: f64 = 0.6;
 const RATES_NEAR: f64 = 1.6;
 /// Least rotation of gravity by the rates in a window, as a logarithm (0.0015 rad): below they are noise and bias, and a

@@ -5,9 +5,9 @@ use crate::condition::{
     Clock, GyroUnit, LONGEST_SECS, MAX_GAP_SECS, OnGap, SAMPLE_RATES, SpikePolicy, StampRepair,
 };
 use crate::diagnostic::Diagnostic;
+use crate::estimate::noise_presets::NOISE_PRESETS;
 use crate::estimate::plan::{
-    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, LONGEST_DELAY, NOISE_PRESETS, Noise,
-    Truncation,
+    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, LONGEST_DELAY, Noise, Truncation,
 };
 use crate::frames::BodyAxes;
 use crate::propagate::{Method, Order};
