@@ -29,12 +29,12 @@ const ELSEWHERE: [(&str, &str); 3] = [
 /// Number of lines of a page that are not run here. A line more is to be looked at.
 const UNTESTED: [(&str, usize); 10] = [
     ("README.md", 3),
-    ("docs/connect.md", 2),
+    ("docs/connect.md", 4),
     ("docs/estimation.md", 1),
     ("docs/inputs.md", 3),
     ("docs/joint.md", 4),
     ("docs/performance.md", 10),
-    ("docs/protocol.md", 7),
+    ("docs/protocol.md", 8),
     ("docs/python.md", 6),
     ("docs/scale.md", 8),
     ("docs/usage.md", 5),

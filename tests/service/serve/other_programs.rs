@@ -34,8 +34,10 @@ fn frames_of_a_vehicle_become_attitudes_over_udp_and_tcp_in_any_cut() {
     ]));
     let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
     let vehicle = UdpSocket::bind("127.0.0.1:0").unwrap();
+    // The first attitude comes with the second sample.
+    vehicle.send_to(&scaled(0), daemon.address(1)).unwrap();
     for n in 0..50 {
-        vehicle.send_to(&scaled(n), daemon.address(1)).unwrap();
+        vehicle.send_to(&scaled(n + 1), daemon.address(1)).unwrap();
         let attitude = watcher.object("ATT");
         assert_eq!(attitude["id"], "copter/SCALED_IMU2");
         // About down in the vehicle's axes is against up in ours.
@@ -46,6 +48,7 @@ fn frames_of_a_vehicle_become_attitudes_over_udp_and_tcp_in_any_cut() {
         );
     }
     let mut link = Client::tcp(daemon.address(2));
+    watcher.object("ATT");
     for byte in (0..3).flat_map(scaled) {
         link.send_bytes(&[byte]);
     }

@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_class_explains_and_what_is_smoothed_keep_the_class() {
+    fn what_no_class_explains_keeps_the_class_and_what_is_smoothed_takes_it() {
         let wide = Settings {
             force_bias_prior: 0.2,
             ..Settings::default()
@@ -352,7 +352,7 @@ mod tests {
             ..EstimationSettings::default()
         };
         let found = prepared_by(&plan, 0.015, Vector3::new(0.2, -0.15, 0.1));
-        assert_eq!(found.noise.name, NOISE_PRESETS[0].name);
+        assert_eq!(found.noise.name, NOISE_PRESETS[1].name);
     }
 
     #[test]

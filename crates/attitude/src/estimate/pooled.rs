@@ -3,7 +3,9 @@
 //! Each recording is looked at by itself, and none begins with what another has told: that two of them differ by more
 //! than they claim to know would not be seen otherwise.
 
-use super::sensor_calibration::{CalibrationTerm, SensorCalibration};
+use super::sensor_calibration::{
+    CalibrationTerm, FIELD, FORCE_BIAS, LEAD, SHARE, SensorCalibration,
+};
 
 /// Numbers that another recording has told too, before their scatter says something.
 const ENOUGH: u32 = 3;
@@ -47,13 +49,13 @@ impl Pooled {
         let disagreement = scatter.map(Scatter::in_sigmas);
         let [gyro, accelerometer, magnetometer] =
             disagreement.map(|by| by.map_or(1.0, |by| by.max(1.0)));
-        widen(&mut calibration.gyro, gyro);
-        widen(&mut calibration.force_bias, accelerometer);
-        widen(&mut calibration.force, accelerometer);
-        widen(&mut calibration.lead, accelerometer);
-        widen(&mut calibration.hard_iron, magnetometer);
-        widen(&mut calibration.soft_iron, magnetometer);
-        widen(&mut calibration.field_lead, magnetometer);
+        widen(&mut calibration.gyro, gyro, SHARE);
+        widen(&mut calibration.force_bias, accelerometer, FORCE_BIAS);
+        widen(&mut calibration.force, accelerometer, SHARE);
+        widen(&mut calibration.lead, accelerometer, LEAD);
+        widen(&mut calibration.hard_iron, magnetometer, FIELD);
+        widen(&mut calibration.soft_iron, magnetometer, SHARE);
+        widen(&mut calibration.field_lead, magnetometer, LEAD);
         Pooled {
             calibration,
             disagreement,
@@ -128,9 +130,10 @@ fn bias(recordings: &[SensorCalibration]) -> Option<CalibrationTerm<3>> {
     Some(pooled)
 }
 
-fn widen<const N: usize>(known: &mut Option<CalibrationTerm<N>>, by: f64) {
+/// Widens sigmas by a factor, up to the largest that a calibration can have.
+fn widen<const N: usize>(known: &mut Option<CalibrationTerm<N>>, by: f64, largest: f64) {
     if let Some(sigma) = known.as_mut().and_then(|known| known.sigma.as_mut()) {
-        *sigma = sigma.map(|sigma| sigma * by);
+        *sigma = sigma.map(|sigma| (sigma * by).min(largest));
     }
 }
 

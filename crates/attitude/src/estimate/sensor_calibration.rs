@@ -10,10 +10,10 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Largest errors a sensor can have, each element: rad/s, shares, m/s^2, s, the field's unit.
 const BIAS: f64 = 10.0;
-const SHARE: f64 = 0.3;
-const FORCE_BIAS: f64 = 100.0;
-const LEAD: f64 = 0.5;
-const FIELD: f64 = 1e6;
+pub(super) const SHARE: f64 = 0.3;
+pub(super) const FORCE_BIAS: f64 = 100.0;
+pub(super) const LEAD: f64 = 0.5;
+pub(super) const FIELD: f64 = 1e6;
 const STEP: f64 = 1.0;
 
 /// Numbers of a calibration with what is known of each. Matrices row by row.

@@ -21,6 +21,9 @@ const UNITS: [f64; 3] = [9.806_65, 1000.0, 1000.0 / 9.806_65];
 const NEAR: f64 = 0.2;
 const SCATTER: f64 = 0.45;
 const FIRST: f64 = 0.5;
+/// Lengths scatter as before, so many times, and by this: what is left in a free fall is noise.
+const MORE: f64 = 2.0;
+const STILL: f64 = 0.1;
 /// The same of a range of half, or twice: at rest alone.
 const RANGE: f64 = 2.0;
 const NEAR_RANGE: f64 = 0.03;
@@ -108,6 +111,7 @@ impl Run {
         let first_off = (self.first - mean).abs();
         let is_unit = UNITS.iter().any(|ratio| is_near(ratio))
             && scatter.max(scatter_before) < SCATTER
+            && scatter < MORE * scatter_before + STILL
             && first_off < FIRST;
         let is_range = (mean.abs() - RANGE.ln()).abs() < NEAR_RANGE
             && scatter.max(scatter_before) < REST

@@ -6,7 +6,7 @@ use crate::pipeline::samples::estimate;
 use nalgebra::Vector3;
 use strapd_attitude::estimate::settings::{Value, defaults, row};
 use strapd_attitude::record::{Nanos, RawSample};
-use strapd_attitude::setting::Choice;
+use strapd_attitude::setting::{Choice, MEND};
 use strapd_bodies::motion::BandLimited;
 
 const RATE_HZ: i64 = 50;
@@ -58,12 +58,12 @@ fn exchanged_axes_are_an_error_whose_map_cures_them_whatever_the_iron() {
             panic!("{all:?}")
         };
         assert_eq!((said.code, said.severity), ("mag-axes", Severity::Error));
-        assert_eq!(said.help, [vec![MAG_AXES.to("YXz")]]);
+        assert_eq!(said.help, [vec![MAG_AXES.to("YXz")], vec![MEND.into()]]);
         let cured = found(&read, &[aided(), MAG_AXES.to("YXz")]);
         assert!(cured.iter().all(|f| f.code == "mag-iron"), "{cured:?}");
         // A map that is given already is mapped on.
         let again = found(&read, &[aided(), MAG_AXES.to("Xyz")]);
-        assert_eq!(again[0].help, [vec![MAG_AXES.to("YXz")]]);
+        assert_eq!(again[0].help, [vec![MAG_AXES.to("YXz")], vec![MEND.into()]]);
     }
 }
 

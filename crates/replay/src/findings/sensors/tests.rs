@@ -6,7 +6,7 @@ use crate::pipeline::samples::estimate;
 use nalgebra::{Matrix3, Vector3};
 use strapd_attitude::estimate::settings::{Value, defaults, row};
 use strapd_attitude::record::{Nanos, RawSample};
-use strapd_attitude::setting::BODY;
+use strapd_attitude::setting::{BODY, MEND};
 use strapd_bodies::motion::BandLimited;
 
 const RATE_HZ: i64 = 50;
@@ -125,7 +125,11 @@ fn the_scale_of_the_gyro_is_named_and_what_is_advised_cures_it() {
         let cause = all.iter().find(|finding| finding.code == SCALE);
         let cause = cause.unwrap_or_else(|| panic!("{factor}: {all:?}"));
         assert!(cause.what.contains(words), "{cause:?}");
-        assert_eq!(cause.help, [[cure.clone()]], "{cause:?}");
+        assert_eq!(
+            cause.help,
+            [vec![cure.clone()], vec![MEND.into()]],
+            "{cause:?}"
+        );
         assert_eq!(found(&bad, &[cure]), []);
     }
     let bad = by_gyro(&clean, &Matrix3::from_diagonal_element(0.6));
