@@ -132,7 +132,7 @@ pub struct Sink {
 
 #[derive(Debug)]
 enum State {
-    Open(Output),
+    Open(Box<Output>),
     /// The reader hung up.
     Closed,
     /// An error has been returned; the file is gone.
@@ -225,7 +225,7 @@ impl Sink {
         let mut sink = Sink {
             path: output.path().map(PathBuf::from),
             is_socket: output.is_socket(),
-            state: State::Open(output),
+            state: State::Open(Box::new(output)),
             form,
             lanes,
             copies: Chunk::default(),

@@ -65,6 +65,7 @@ fn is_better(before: &[Finding], after: &[Finding], code: &str) -> bool {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use strapd_attitude::setting::{GYRO_AXES, GYRO_SCALE, MEND};

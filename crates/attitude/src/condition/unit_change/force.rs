@@ -87,7 +87,7 @@ impl ForceLevel {
         run.sum += length;
         run.squares += length * length;
         let span = stamp.since(run.from);
-        if span >= GIVEN_UP || span < 0 {
+        if !(0..GIVEN_UP).contains(&span) {
             *self = ForceLevel::default();
             return None;
         }
@@ -109,7 +109,7 @@ impl Run {
         let scatter = (self.squares / n - mean * mean).max(0.0).sqrt();
         let is_near = |ratio: &f64| (mean.abs() - ratio.ln()).abs() < NEAR;
         let first_off = (self.first - mean).abs();
-        let is_unit = UNITS.iter().any(|ratio| is_near(ratio))
+        let is_unit = UNITS.iter().any(is_near)
             && scatter.max(scatter_before) < SCATTER
             && scatter < MORE * scatter_before + STILL
             && first_off < FIRST;

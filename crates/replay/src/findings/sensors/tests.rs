@@ -137,9 +137,10 @@ fn the_scale_of_the_gyro_is_named_and_what_is_advised_cures_it() {
     let [finding] = all.as_slice() else {
         panic!("{all:?}")
     };
-    let [[cure]] = finding.help.iter().map(Vec::as_slice).collect::<Vec<_>>()[..] else {
+    let [[cure], [mend]] = finding.help.iter().map(Vec::as_slice).collect::<Vec<_>>()[..] else {
         panic!("{finding:?}")
     };
+    assert_eq!(*mend, MEND.into());
     let advised: f64 = cure.value.parse().unwrap();
     assert!((advised * 0.6 - 1.0).abs() < 0.02, "{finding:?}");
 }
