@@ -75,7 +75,7 @@ pub use report::{ClockSet, FirstBad, GAPS_KEPT, Gap, Gaps, Report, Wraps};
 pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};
 pub use settings::{OnGap, Settings, SettingsError};
 pub use spikes::SpikeCount;
-pub use unit_change::{UnitChange, UnitChanges};
+pub use unit_change::{ACCEL_UNITS, GYRO_UNITS, UnitChange, UnitChanges};
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
 use clock::{BatchLearner, BatchLine, ClockSteps, IndexClock, Turns};

@@ -8,6 +8,7 @@ pub mod imu;
 pub(crate) mod problem;
 pub mod record;
 pub(crate) mod transcript;
+pub(crate) mod walk;
 
 pub use bytes::HEAD;
 pub(crate) use bytes::{Bytes, head_at};

@@ -6,6 +6,13 @@ use serde_json::{Map, Value, json};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::Choice;
 
+/// Codes of a stream that is no single sensor in one unit.
+pub(crate) const MIXED: &str = "two-sensors";
+pub(crate) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
+pub(crate) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
+/// Codes of a sensor that is read in wrong axes, by a wrong factor or in a wrong unit: the data show the right one.
+const MISREAD: [&str; 4] = ["gyro-axes", "gyro-scale", "unit-degrees", "mag-axes"];
+
 /// Severity of a finding.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Severity {
@@ -74,6 +81,17 @@ impl Finding {
     pub(crate) fn advise(mut self, advice: impl Into<String>) -> Finding {
         self.advice = advice.into();
         self
+    }
+
+    /// Whether a sensor is read otherwise than the data show to be right.
+    pub(crate) fn is_misread(&self) -> bool {
+        MISREAD.contains(&self.code)
+    }
+
+    /// Whether the attitude is wrong by more than its sigma, which knows nothing of it.
+    pub(crate) fn is_beyond_sigma(&self) -> bool {
+        let is_no_sensor = [MIXED, GYRO_UNIT_CHANGE, ACCEL_UNIT_CHANGE].contains(&self.code);
+        self.severity == Severity::Error && (is_no_sensor || self.is_misread())
     }
 
     /// Settings that help; called again, others that do as well.

@@ -2,11 +2,10 @@
 //!
 //! Guarded as `POST /samples` is: no page of a browser posts, and with a token only who shows it.
 
-use super::http::answer::{refusal, response, unauthorised};
+use super::http::answer::{refusal, response};
 use super::http::connection::Connection;
-use super::samples::{Form, form, no_page, read};
-use crate::serve::core::hub::{Asker, count};
-use crate::serve::guard::log_throttle;
+use super::samples::{Form, form, read, turned_away};
+use crate::serve::core::hub::Asker;
 use crate::serve::protocol::wire;
 use axum::body::Body;
 use axum::extract::Extension;
@@ -19,17 +18,10 @@ pub(in crate::serve) async fn post(
 ) -> Response<Body> {
     let hub = &connection.hub;
     let (parts, body) = request.into_parts();
-    if let Err(why) = no_page(&parts.headers) {
-        count(&hub.counters.refused, 1);
-        log_throttle::warn(
-            "a page posts",
-            &format!("POST /reset, from a page: refused ({why})"),
-        );
-        let why = "resets are not taken from pages; the daemon's own page asks over its WebSocket";
-        return refusal(StatusCode::FORBIDDEN, "forbidden", why);
-    }
-    if hub.token().is_some() && !connection.trusted {
-        return unauthorised();
+    let other_way =
+        "resets are not taken from pages; the daemon's own page asks over its WebSocket";
+    if let Some(refused) = turned_away(&connection, &parts, other_way) {
+        return refused;
     }
     if !matches!(form(&parts.headers), Ok(Form::Json)) {
         let why = "the body must be Content-Type: application/json, an object such as {\"all\":true,\"heading\":0}";

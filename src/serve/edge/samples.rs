@@ -14,6 +14,7 @@ use crate::serve::guard::log_throttle;
 use axum::body::Body;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, Request, Response, StatusCode, header};
 use futures_util::StreamExt;
 use posters::MAX_POSTERS;
@@ -48,20 +49,10 @@ pub(in crate::serve) async fn post(
 ) -> Response<Body> {
     let hub = &connection.hub;
     let (parts, body) = request.into_parts();
-    if let Err(why) = no_page(&parts.headers) {
-        count(&hub.counters.refused, 1);
-        log_throttle::warn(
-            "a page posts",
-            &format!("POST /samples, from a page: refused ({why})"),
-        );
-        return refusal(
-            StatusCode::FORBIDDEN,
-            "forbidden",
-            "samples are not taken from pages; a page may send them over a WebSocket at /ws",
-        );
-    }
-    if hub.token().is_some() && !connection.trusted {
-        return unauthorised();
+    let other_way =
+        "samples are not taken from pages; a page may send them over a WebSocket at /ws";
+    if let Some(refused) = turned_away(&connection, &parts, other_way) {
+        return refused;
     }
     let is_text = parts.uri.query().is_none_or(is_text);
     let name = match asked {
@@ -141,8 +132,30 @@ pub(super) async fn not_posted() -> Response<Body> {
     refused
 }
 
+/// Answer to who may not post: a page of a browser, which is told the other way, and with a token who does not show it.
+pub(super) fn turned_away(
+    connection: &Connection,
+    parts: &Parts,
+    other_way: &str,
+) -> Option<Response<Body>> {
+    let hub = &connection.hub;
+    if let Err(why) = no_page(&parts.headers) {
+        count(&hub.counters.refused, 1);
+        let path = printable(parts.uri.path());
+        log_throttle::warn(
+            "a page posts",
+            &format!("POST {path}, from a page: refused ({why})"),
+        );
+        return Some(refusal(StatusCode::FORBIDDEN, "forbidden", other_way));
+    }
+    if hub.token().is_some() && !connection.trusted {
+        return Some(unauthorised());
+    }
+    None
+}
+
 /// Whether no browser's page can have sent this.
-pub(super) fn no_page(headers: &HeaderMap) -> Result<(), String> {
+fn no_page(headers: &HeaderMap) -> Result<(), String> {
     if let Some(origin) = headers.get(header::ORIGIN) {
         let origin = String::from_utf8_lossy(origin.as_bytes());
         return Err(format!("Origin {}", printable(&origin)));

@@ -115,6 +115,36 @@ fn a_second_signal_ends_it_at_once() {
 }
 
 #[test]
+fn health_says_what_does_not_go_on_and_is_health_all_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("states");
+    std::fs::create_dir(&folder).unwrap();
+    let state = folder.join("state.json");
+    let process = Process::start(&[
+        "--listen",
+        TCP,
+        "--listen",
+        WS,
+        "--state",
+        state.to_str().unwrap(),
+    ]);
+    let mut sender = Client::tcp(process.address(0));
+    let health = || get(process.address(1), "/healthz", &[("Host", "localhost")]);
+    sender.send(&rate("a", 0, 1.0));
+    eventually("a saved state", || state.exists());
+    assert_eq!(health(), (200, "ok\n".to_owned()));
+    std::fs::rename(&folder, dir.path().join("gone")).unwrap();
+    let mut n = 1;
+    eventually("a state that cannot be saved", || {
+        sender.send(&rate("a", n, 1.0));
+        n += 1;
+        let (status, text) = health();
+        assert_eq!(status, 200);
+        text.starts_with("ok\nbut attitudes are not saved: ")
+    });
+}
+
+#[test]
 fn health_and_metrics_are_on_the_same_http() {
     let daemon = Daemon::start(listening(&[TCP, WS]));
     let mut sender = Client::tcp(daemon.address(0));

@@ -12,6 +12,19 @@ use crate::record::Nanos;
 use force::ForceLevel;
 use rate::RateUnit;
 
+/// Units of a gyro: ratio of their readings for the same rate, the unit of the larger, of the smaller.
+pub const GYRO_UNITS: [(f64, &str, &str); 3] = [
+    (180.0 / std::f64::consts::PI, "deg/s", "rad/s"),
+    (1000.0, "mrad/s", "rad/s"),
+    (1000.0 * std::f64::consts::PI / 180.0, "mrad/s", "deg/s"),
+];
+/// Units of an accelerometer, as [`GYRO_UNITS`].
+pub const ACCEL_UNITS: [(f64, &str, &str); 3] = [
+    (9.806_65, "m/s^2", "g"),
+    (1000.0, "mg", "g"),
+    (1000.0 / 9.806_65, "mg", "m/s^2"),
+];
+
 /// Change of a sensor's unit or range.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct UnitChange {

@@ -6,6 +6,7 @@
 use super::layout::Layout;
 use crate::records::cdr::{Cdr, put};
 use crate::records::imu;
+use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 
 /// Tesla of a milligauss.
 const MILLIGAUSS: f64 = 1e-7;
@@ -94,13 +95,9 @@ fn flu([x, y, z]: [f64; 3]) -> [f64; 3] {
 
 /// `[x, y, z, w]`, FLU body to a world with x north, y west, z up, of angles in degrees, FRD body to NED.
 fn attitude(angles: [f64; 3]) -> [f64; 4] {
-    let [(sr, cr), (sp, cp), (sy, cy)] = angles.map(|angle| (angle.to_radians() / 2.0).sin_cos());
-    let w = cr * cp * cy + sr * sp * sy;
-    let [x, y, z] = [
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ];
+    let [roll, pitch, yaw] = angles.map(f64::to_radians);
+    let q = Quaternion::<(), ()>::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
+    let [w, x, y, z] = q.wxyz();
     [x, -y, -z, w]
 }
 

@@ -9,6 +9,7 @@ use super::sample::Content;
 use crate::decode::known_definition;
 use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::{ReadProgress, Transcribe, Transcript};
+use crate::records::walk::Walk;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Longest message, and the marks behind it.
@@ -19,28 +20,23 @@ const FMT: u8 = MAGIC[2];
 /// A log under way.
 #[derive(Debug)]
 pub(crate) struct Transcriber {
-    at: u64,
+    walk: Walk,
     /// Layouts by type.
     layouts: BTreeMap<u8, Layout>,
     /// Channel and number of messages of a content's instance.
     channels: BTreeMap<(Content, u8), (u16, u32)>,
     schemas: BTreeSet<u16>,
-    /// Offset at which bytes begin that are no message.
-    lost: Option<u64>,
     message: Vec<u8>,
-    problems: Problems,
 }
 
 impl Default for Transcriber {
     fn default() -> Transcriber {
         Transcriber {
-            at: 0,
+            walk: Walk::default(),
             layouts: BTreeMap::from([(FMT, Layout::own())]),
             channels: BTreeMap::new(),
             schemas: BTreeSet::new(),
-            lost: None,
             message: Vec::new(),
-            problems: Problems::default(),
         }
     }
 }
@@ -52,36 +48,28 @@ impl Transcribe for Transcriber {
         }
         let used = match self.length(ahead) {
             Some(length) if length <= ahead.len() => {
-                self.found();
+                self.walk.found();
                 let message = ahead.get(..length).unwrap_or(ahead);
                 self.take(message, to);
                 length
             }
             // The end, within a message.
             Some(length) if is_end => {
-                self.found();
-                let (need, have) = (length as u64, ahead.len() as u64);
-                self.fault(ProblemKind::Truncated { need, have }, None);
+                self.walk.truncated(length, ahead.len());
                 ahead.len()
             }
             _ => {
-                self.lost.get_or_insert(self.at);
-                let marks = |at: &usize| is_marked(ahead.get(*at..).unwrap_or(&[]));
-                let next = (1..ahead.len()).find(marks);
                 // A mark at the end is looked at again with what follows it.
                 let most = ahead.len() - usize::from(!is_end);
-                next.unwrap_or(most).min(most).max(1)
+                self.walk.lose(ahead, most, is_marked)
             }
         };
-        self.at = self.at.saturating_add(used as u64);
-        if is_end && used == ahead.len() {
-            self.found();
-        }
+        self.walk.go_on(used, is_end && used == ahead.len());
         ReadProgress::Used(used)
     }
 
     fn finish(self: Box<Self>) -> (String, Problems) {
-        ("ArduPilot".to_owned(), self.problems)
+        ("ArduPilot".to_owned(), self.walk.into_problems())
     }
 
     fn run(&self) -> usize {
@@ -103,19 +91,6 @@ impl Transcriber {
         let length = self.layouts.get(kind)?.length;
         let rest = ahead.get(length..).unwrap_or(&[]);
         (rest.is_empty() || is_marked(rest)).then_some(length)
-    }
-
-    /// Tells of the bytes before that were none.
-    fn found(&mut self) {
-        if let Some(offset) = self.lost.take() {
-            let skipped = self.at.saturating_sub(offset);
-            self.problems
-                .add(offset, ProblemKind::Garbage { skipped }, None);
-        }
-    }
-
-    fn fault(&mut self, kind: ProblemKind, messages: Option<u64>) {
-        self.problems.add(self.at, kind, messages);
     }
 
     fn take(&mut self, message: &[u8], to: &mut Transcript) {
@@ -153,7 +128,7 @@ impl Transcriber {
             }
             None => {
                 let opcode = FMT;
-                self.fault(ProblemKind::BadDefinition { opcode }, None);
+                self.walk.fault(ProblemKind::BadDefinition { opcode }, None);
             }
         }
     }

@@ -10,6 +10,7 @@ use crate::decode::known_definition;
 use crate::records::imu;
 use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::{ReadProgress, Transcribe, Transcript};
+use crate::records::walk::Walk;
 use std::collections::BTreeMap;
 
 /// Bytes looked at to believe a frame, and to find one.
@@ -23,17 +24,14 @@ type Sender = (u8, u8, &'static str, u8);
 /// A log under way.
 #[derive(Debug, Default)]
 pub(crate) struct Transcriber {
-    at: u64,
+    walk: Walk,
     /// Whether no time stands before a frame.
     is_bare: bool,
     sequences: Sequences,
     channels: BTreeMap<Sender, (u16, u32)>,
     /// The first that sent a sample: its topics have plain names.
     first: Option<(u8, u8)>,
-    /// Offset at which bytes begin that are no frame.
-    lost: Option<u64>,
     message: Vec<u8>,
-    problems: Problems,
 }
 
 impl Transcribe for Transcriber {
@@ -44,12 +42,12 @@ impl Transcribe for Transcriber {
         let stamp = self.stamp();
         let used = match frame(ahead, stamp) {
             Ok(found) if is_believed(&found, ahead, stamp) => {
-                self.found();
+                self.walk.found();
                 self.count(&found);
                 match found.checked {
                     Checked::Wrong => {
-                        self.fault(ProblemKind::Checksum, Some(1));
-                        self.problems.skip(found.total as u64);
+                        self.walk.fault(ProblemKind::Checksum, Some(1));
+                        self.walk.skip(found.total as u64);
                     }
                     Checked::Right => self.tell(&found, to),
                     Checked::Unknown => {}
@@ -58,29 +56,21 @@ impl Transcribe for Transcriber {
             }
             // The end, unless another frame begins within it.
             Err(Some(need)) if is_end && !has_frame(ahead, stamp) => {
-                self.found();
-                let (need, have) = (need as u64, ahead.len() as u64);
-                self.fault(ProblemKind::Truncated { need, have }, None);
+                self.walk.truncated(need, ahead.len());
                 ahead.len()
             }
             _ => {
-                self.lost.get_or_insert(self.at);
-                let may_be = |at: &usize| ahead.get(*at..).is_some_and(|a| begins(a, stamp));
-                let next = (1..ahead.len()).find(may_be);
                 // What could begin a time is looked at again with what follows it.
                 let most = if is_end { ahead.len() } else { ahead.len() - 9 };
-                next.unwrap_or(most).min(most).max(1)
+                self.walk.lose(ahead, most, |rest| begins(rest, stamp))
             }
         };
-        self.at = self.at.saturating_add(used as u64);
-        if is_end && used == ahead.len() {
-            self.found();
-        }
+        self.walk.go_on(used, is_end && used == ahead.len());
         ReadProgress::Used(used)
     }
 
     fn finish(self: Box<Self>) -> (String, Problems) {
-        (String::new(), self.problems)
+        (String::new(), self.walk.into_problems())
     }
 
     fn run(&self) -> usize {
@@ -110,21 +100,9 @@ impl Transcriber {
         let missing = self.sequences.missing(found);
         if missing > 0 {
             let count = u64::from(missing);
-            self.fault(ProblemKind::FramesMissing { count }, Some(count));
+            self.walk
+                .fault(ProblemKind::FramesMissing { count }, Some(count));
         }
-    }
-
-    /// Tells of the bytes before that were none.
-    fn found(&mut self) {
-        if let Some(offset) = self.lost.take() {
-            let skipped = self.at.saturating_sub(offset);
-            self.problems
-                .add(offset, ProblemKind::Garbage { skipped }, None);
-        }
-    }
-
-    fn fault(&mut self, kind: ProblemKind, messages: Option<u64>) {
-        self.problems.add(self.at, kind, messages);
     }
 
     fn tell(&mut self, found: &Frame<'_>, to: &mut Transcript) {
@@ -142,7 +120,7 @@ impl Transcriber {
             Some(known) => known,
             None => {
                 let Some(number) = u16::try_from(next).ok().filter(|n| *n < u16::MAX) else {
-                    return self.fault(ProblemKind::TooManyDefinitions, None);
+                    return self.walk.fault(ProblemKind::TooManyDefinitions, None);
                 };
                 if number == 0 {
                     let text = known_definition(imu::TYPE).unwrap_or_default();

@@ -3,12 +3,9 @@
 use super::{Finding, Severity};
 use strapd_attitude::setting::{Choice, MEND};
 
-/// Findings whose cure follows from the data alone.
-const CERTAIN: [&str; 4] = ["gyro-axes", "gyro-scale", "unit-degrees", "mag-axes"];
-
 /// The cure of a finding, where it has exactly one.
 pub(crate) fn cure(finding: &Finding) -> Option<&[Choice]> {
-    let is_certain = finding.severity == Severity::Error && CERTAIN.contains(&finding.code);
+    let is_certain = finding.severity == Severity::Error && finding.is_misread();
     let of_mending = |set: &&Vec<Choice>| set.iter().all(|choice| choice.setting != MEND);
     let mut cures = finding.help.iter().filter(of_mending);
     match (cures.next(), cures.next()) {

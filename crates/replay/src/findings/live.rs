@@ -6,6 +6,7 @@
 use super::samples::{self, Seen};
 use super::{Finding, Severity, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
+use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_UNIT_CHANGE, MIXED};
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::{Clock, ClockSpeed, GyroUnit, SpeedPass};
@@ -24,9 +25,9 @@ const LASTING: [&str; 12] = [
     "stuck",
     "field-frozen",
     "field-empty",
-    stream::MIXED,
-    stream::GYRO_UNIT_CHANGE,
-    stream::ACCEL_UNIT_CHANGE,
+    MIXED,
+    GYRO_UNIT_CHANGE,
+    ACCEL_UNIT_CHANGE,
 ];
 /// Codes of those about gyro and gravity.
 const OF_GYRO: [&str; 3] = ["gyro-axes", "gyro-scale", "gyro-against-gravity"];

@@ -3,39 +3,16 @@
 //! Apart from the counts of a run because the advice depends on who reads it: a recording is split, a sender is mended.
 
 use super::{Finding, Severity};
+use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_UNIT_CHANGE, MIXED};
 use crate::summary::significant;
-use strapd_attitude::condition::{Apart, Mixture, Report, UnitChange};
+use strapd_attitude::condition::{ACCEL_UNITS, Apart, GYRO_UNITS, Mixture, Report, UnitChange};
 use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::{COLUMNS, GYRO_UNIT, START, TOPIC, UNTIL, WHERE};
 
-/// Codes of the findings here.
-pub(super) const MIXED: &str = "two-sensors";
-pub(super) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
-pub(super) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
-/// Findings about gyro and gravity that these explain.
-const EXPLAINED: [&str; 6] = [
-    "gyro-axes",
-    "gyro-scale",
-    "gyro-against-gravity",
-    "mag-axes",
-    "unit-against-gravity",
-    "unit-degrees",
-];
+/// Findings about gyro and gravity that these explain, beside those of a misread sensor.
+const EXPLAINED: [&str; 2] = ["gyro-against-gravity", "unit-against-gravity"];
 /// Ratio of two units by which readings change, less 1.
 const NEAR: f64 = 0.15;
-/// Units of an accelerometer by their ratio, the larger readings first.
-const FORCES: [(f64, &str, &str); 3] = [
-    (9.806_65, "m/s^2", "g"),
-    (1000.0, "mg", "g"),
-    (1000.0 / 9.806_65, "mg", "m/s^2"),
-];
-/// The same of a gyro.
-const RATES: [(f64, &str, &str); 3] = [
-    (180.0 / std::f64::consts::PI, "deg/s", "rad/s"),
-    (1000.0, "mrad/s", "rad/s"),
-    (1000.0 * std::f64::consts::PI / 180.0, "mrad/s", "deg/s"),
-];
-
 /// Findings from the report of a stream: of a recording, or live.
 pub(crate) fn find(report: &Report, is_live: bool) -> Vec<Finding> {
     let since = |at: Nanos| report.first.map_or(0.0, |first| at.secs_since(first));
@@ -43,12 +20,16 @@ pub(crate) fn find(report: &Report, is_live: bool) -> Vec<Finding> {
     let changes = report.unit_changes;
     let gyro = changes.gyro.map(|change| {
         let at = since(change.at);
-        let found = changed((&change, at), ("gyro", GYRO_UNIT_CHANGE), &RATES);
+        let found = changed((&change, at), ("gyro", GYRO_UNIT_CHANGE), &GYRO_UNITS);
         advised(found, (&change, at), is_live)
     });
     let accel = changes.accel.map(|change| {
         let at = since(change.at);
-        let found = changed((&change, at), ("accelerometer", ACCEL_UNIT_CHANGE), &FORCES);
+        let found = changed(
+            (&change, at),
+            ("accelerometer", ACCEL_UNIT_CHANGE),
+            &ACCEL_UNITS,
+        );
         advised(found, (&change, at), is_live)
     });
     mixed.into_iter().chain(gyro).chain(accel).collect()
@@ -58,7 +39,7 @@ pub(crate) fn find(report: &Report, is_live: bool) -> Vec<Finding> {
 pub(super) fn settle(found: &mut Vec<Finding>) {
     let is_cause = |f: &Finding| [MIXED, GYRO_UNIT_CHANGE].contains(&f.code);
     if found.iter().any(is_cause) {
-        found.retain(|f| !EXPLAINED.contains(&f.code));
+        found.retain(|f| !f.is_misread() && !EXPLAINED.contains(&f.code));
     }
 }
 

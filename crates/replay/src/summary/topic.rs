@@ -32,17 +32,6 @@ use strapd_attitude::setting::{
 };
 use strapd_attitude::worlds::EARTH_RATE;
 
-/// Codes of errors by which an attitude is wrong by more than its sigma: sensors that contradict each other.
-const CONTRADICT: [&str; 7] = [
-    "gyro-axes",
-    "gyro-scale",
-    "unit-degrees",
-    "mag-axes",
-    "two-sensors",
-    "gyro-unit-change",
-    "accel-unit-change",
-];
-
 /// Summary of one topic: of a log, or of samples that still come.
 #[derive(Clone, Debug, Default)]
 pub struct TopicSummary {
@@ -491,8 +480,7 @@ impl TopicSummary {
     }
 
     fn contradiction(&self) -> Option<&Finding> {
-        let is_one = |f: &&Finding| f.severity == Severity::Error && CONTRADICT.contains(&f.code);
-        self.findings.iter().find(is_one)
+        self.findings.iter().find(|f| f.is_beyond_sigma())
     }
 
     /// Doubt about sigma, where there is one.

@@ -1,6 +1,6 @@
 //! Squared lengths of specific forces -> a step from gravity in one unit to gravity in another. Pure.
 
-use super::UnitChange;
+use super::{ACCEL_UNITS, UnitChange};
 use crate::record::Nanos;
 
 /// Squared length, by the usual, within which a force is the usual one: 0.7 and 1.4 of it.
@@ -15,9 +15,8 @@ const NANOS: i64 = 3_000_000_000;
 const NANOS_LARGER: i64 = 6_000_000_000;
 /// Time after which lengths that no change of a unit explains are the usual ones, ns.
 const GIVEN_UP: i64 = 10_000_000_000;
-/// Ratios of units (m/s^2 by g, g by mg, m/s^2 by mg), and how far a ratio, its logarithm, and the first sample's may be
-/// from it: accelerations move them.
-const UNITS: [f64; 3] = [9.806_65, 1000.0, 1000.0 / 9.806_65];
+/// Largest distance of a ratio, as a logarithm, of its scatter, and of the first sample's from that of two units:
+/// accelerations move them.
 const NEAR: f64 = 0.2;
 const SCATTER: f64 = 0.45;
 const FIRST: f64 = 0.5;
@@ -107,9 +106,9 @@ impl Run {
         let n = f64::from(self.samples);
         let mean = self.sum / n;
         let scatter = (self.squares / n - mean * mean).max(0.0).sqrt();
-        let is_near = |ratio: &f64| (mean.abs() - ratio.ln()).abs() < NEAR;
+        let is_near = |ratio: f64| (mean.abs() - ratio.ln()).abs() < NEAR;
         let first_off = (self.first - mean).abs();
-        let is_unit = UNITS.iter().any(is_near)
+        let is_unit = ACCEL_UNITS.iter().any(|(ratio, ..)| is_near(*ratio))
             && scatter.max(scatter_before) < SCATTER
             && scatter < MORE * scatter_before + STILL
             && first_off < FIRST;

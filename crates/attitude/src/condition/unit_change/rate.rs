@@ -4,7 +4,7 @@
 //! Their ratio is near 1 for a slow motion and smaller for one that accelerates, but it does not jump by the ratio of two
 //! units while the rates themselves jump by the same.
 
-use super::UnitChange;
+use super::{GYRO_UNITS, UnitChange};
 use crate::condition::quality::GravityTrack;
 use crate::record::Nanos;
 use nalgebra::Vector3;
@@ -12,12 +12,6 @@ use nalgebra::Vector3;
 /// Rotation of gravity in a window that says something of the rates, rad, and its cosine with that by the gyro.
 const ROTATES: f64 = 0.02;
 const ALONG: f64 = 0.8;
-/// Units by each other: deg/s and mrad/s by rad/s, mrad/s by deg/s.
-const UNITS: [f64; 3] = [
-    180.0 / std::f64::consts::PI,
-    1000.0,
-    1000.0 * std::f64::consts::PI / 180.0,
-];
 /// Logarithm of a window's ratio by the usual that may be another unit's, and the largest of a right one.
 const JUMPS: f64 = 1.8;
 const RIGHT: f64 = 2.2;
@@ -122,7 +116,7 @@ impl Level {
     fn change(&self, other: &Level, at: Nanos) -> Option<UnitChange> {
         let (jump, of_rates) = (other.ratio - self.ratio, other.rate - self.rate);
         let is_steady = self.scatter().max(other.scatter()) < SCATTER;
-        let both_ways = UNITS.iter().flat_map(|unit| [*unit, 1.0 / unit]);
+        let both_ways = GYRO_UNITS.iter().flat_map(|(unit, ..)| [*unit, 1.0 / unit]);
         let unit = both_ways.min_by(|a, b| {
             let off = |unit: &f64| (jump - unit.ln()).abs();
             off(a).total_cmp(&off(b))

@@ -107,7 +107,8 @@ fn read(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, usize, Vec<ProblemKind>) {
         }
         at = end;
     }
-    let faults = transcriber.problems.first().iter();
+    let (_, problems) = Box::new(transcriber).finish();
+    let faults = problems.first().iter();
     (messages, channels, faults.map(|f| f.kind.clone()).collect())
 }
 

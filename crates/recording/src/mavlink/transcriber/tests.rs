@@ -85,7 +85,8 @@ fn read_by(
         }
         at = end;
     }
-    let faults = transcriber.problems.first().iter();
+    let (_, problems) = Box::new(transcriber).finish();
+    let faults = problems.first().iter();
     let faults = faults.map(|fault| fault.kind.clone()).collect();
     (messages, faults)
 }
