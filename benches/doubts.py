@@ -2,7 +2,7 @@
 """Faults put into recordings and simulated motions -> which of them `strapd replay` names, as a Markdown table.
 
     cargo build
-    benches/doubts.py SCRATCH_DIR [RECORDING...]      STRAPD=target/debug/strapd
+    benches/doubts.py SCRATCH_DIR [RECORDING...]      STRAPD=target/debug/strapd SEEDS=1,2
 
 Each recording is cut to its first SECS; motions are those of `strapd simulate` with the noise of a consumer sensor. A
 fault is found where a finding of its code is there; the row `none` counts errors and warnings of the data as they are.
@@ -17,6 +17,7 @@ STRAPD = os.path.abspath(os.environ.get("STRAPD", "target/debug/strapd"))
 MOTIONS = ["hand", "arm", "walking", "running", "car", "boat", "drone", "circling"]
 GYRO, FORCE = [[f"{of}_{axis}" for axis in "xyz"] for of in ("gyro", "accel")]
 HZ, SECS = 100, 60
+SEEDS = os.environ.get("SEEDS", "1").split(",")
 
 
 def run(*arguments):
@@ -107,11 +108,12 @@ def main():
     scratch, *recordings = sys.argv[1:]
     os.makedirs(scratch, exist_ok=True)
     data = {os.path.basename(path): rows_of(run("cat", "--format", "csv", path)) for path in recordings}
-    for motion in MOTIONS:
-        path = os.path.join(scratch, f"{motion}.csv")
-        run("simulate", motion, "--rate-hz", str(HZ), "--duration", str(SECS), "--noise", "consumer_imu", "-o", path, "--force")
+    for motion, seed in ((motion, seed) for motion in MOTIONS for seed in SEEDS):
+        path = os.path.join(scratch, f"{motion}-{seed}.csv")
+        kind = ["--rate-hz", str(HZ), "--duration", str(SECS), "--noise", "consumer_imu", "--seed", seed]
+        run("simulate", motion, *kind, "-o", path, "--force")
         with open(path, encoding="utf-8") as file:
-            data[motion] = rows_of(file.read())
+            data[f"{motion} {seed}"] = rows_of(file.read())
     print("| fault | found | not found in | errors of another name |\n|---|---|---|---|")
     for name, (change, codes) in FAULTS.items():
         missed, others = [], {}

@@ -261,11 +261,7 @@ impl Consistency {
         if !segment.moves() {
             return;
         }
-        let scatter = self
-            .identity
-            .push(&segment)
-            .first()
-            .map_or(0.0, |s| s.sqrt());
+        let scatter = self.identity.push(&segment).as_recorded();
         self.scattered.push_back(scatter > GATE_SCATTER);
         if self.scattered.len() > GATE_LAST {
             self.scattered.pop_front();

@@ -179,3 +179,43 @@ fn a_daemon_does_not_mend() {
     let ran = strapd(dir.path(), "serve --listen tcp-listen://127.0.0.1:0 --mend");
     ran.refused(2, &["--mend", "a live stream"]);
 }
+
+#[test]
+fn a_hand_that_moves_fast_tells_axes_and_units_of_its_gyro() {
+    let dir = tempfile::tempdir().unwrap();
+    let made =
+        "simulate hand --noise consumer_imu --duration 60 --rate-hz 100 --seed 5 -o hand.csv";
+    strapd(dir.path(), made).done();
+    for (flags, code, words) in [
+        ("", "", ""),
+        ("--gyro-axes YXZ", "gyro-axes", "about x is the recorded y"),
+        ("--gyro-axes xYZ", "gyro-axes", "about x is the recorded -x"),
+        // Gravity vanishes under such rates, and what vanishes does not wander.
+        (
+            "--gyro-scale 57.29578",
+            "gyro-scale",
+            "true rates are 0.017",
+        ),
+        ("--gyro-scale 0.01745329", "gyro-scale", "true rates are 5"),
+        ("--gyro-scale 1000", "gyro-scale", "true rates are 0.0010"),
+    ] {
+        let ran = strapd(dir.path(), &format!("check hand.csv --json {flags}"));
+        let all: Value = serde_json::from_str(&ran.out).unwrap_or_else(|e| panic!("{e}: {ran:?}"));
+        let findings = all["findings"].as_array().unwrap();
+        let named: Vec<&Value> = findings
+            .iter()
+            .filter(|f| f["severity"] == "error")
+            .collect();
+        match code {
+            "" => assert_eq!(named, Vec::<&Value>::new()),
+            _ => {
+                assert_eq!(named.len(), 1, "{flags}: {named:?}");
+                assert_eq!(named[0]["code"], code, "{flags}");
+                assert!(
+                    named[0]["what"].as_str().unwrap().contains(words),
+                    "{named:?}"
+                );
+            }
+        }
+    }
+}

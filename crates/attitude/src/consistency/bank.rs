@@ -14,8 +14,29 @@ pub(super) const MAPS: usize = 48;
 /// Factors are powers of this, of these exponents without 0.
 const RATIO: f64 = 1.25;
 const EXPONENTS: std::ops::RangeInclusive<i32> = -41..=10;
+/// Factors that units, ranges and counts of chips make: a hand turns ten rad in a segment, of which the 12 % between two
+/// powers leave nothing that stands still.
+const UNITS: [f64; 13] = [
+    DEGREE,
+    1.0 / DEGREE,
+    1e-3,
+    0.5,
+    2.0,
+    DEGREE / 16.4,
+    DEGREE / 32.8,
+    DEGREE / 65.5,
+    DEGREE / 131.0,
+    DEGREE * 70e-3,
+    DEGREE * 35e-3,
+    DEGREE * 17.5e-3,
+    DEGREE * 8.75e-3,
+];
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Hypotheses in the bank.
-const HYPOTHESES: usize = MAPS + 51;
+const HYPOTHESES: usize = MAPS + 51 + UNITS.len();
+/// Least mean force of what stands still, g: rates of any other size turn gravity until nothing of it is left, and
+/// nothing does not wander.
+const LEAST_GRAVITY: f64 = 0.5;
 /// Segments that count: what came before is forgotten.
 const MEMORY: usize = 64;
 /// Scatter of gravity that is none, g^2.
@@ -32,6 +53,9 @@ const LEAST_SHARE: f64 = 0.85;
 /// Largest scatter of the map that is found, g, and by that of the identity.
 const LARGEST_FOUND: f64 = 0.06;
 const LARGEST_RATIO: f64 = 0.6;
+/// The same of what is moved about hard, whose own accelerations scatter: a map that has a peak stands out by more.
+const LARGEST_FOUND_SHAKEN: f64 = 0.15;
+const LARGEST_RATIO_SHAKEN: f64 = 0.4;
 /// Least scatter of the identity, g; where physics makes gravity turn less than the body.
 const LEAST_IDENTITY: f64 = 0.05;
 const LEAST_IDENTITY_LESS: f64 = 0.09;
@@ -83,15 +107,29 @@ fn bank() -> Vec<Hypothesis> {
         }
     }
     maps.sort_by(|some, other| some.cost.total_cmp(&other.cost));
-    maps.extend(EXPONENTS.filter(|k| *k != 0).map(|k| {
-        let factor = RATIO.powi(k);
-        Hypothesis {
-            map: Matrix3::from_diagonal_element(factor),
-            factor: Some(factor),
-            cost: 1.5 + 0.5 * factor.ln().abs(),
-        }
+    let powers = EXPONENTS.filter(|k| *k != 0).map(|k| RATIO.powi(k));
+    maps.extend(powers.chain(UNITS).map(|factor| Hypothesis {
+        map: Matrix3::from_diagonal_element(factor),
+        factor: Some(factor),
+        cost: 1.5 + 0.5 * factor.ln().abs(),
     }));
     maps
+}
+
+/// Scatter of gravity in a segment, g^2.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    /// Under each hypothesis, with what is missing of gravity.
+    of: Vec<f64>,
+    /// As recorded, without that: what spins about itself has a force that is mostly no gravity.
+    wanders: f64,
+}
+
+impl Row {
+    /// Scatter as recorded, g.
+    pub(super) fn as_recorded(&self) -> f64 {
+        self.of.first().map_or(0.0, |s| s.sqrt())
+    }
 }
 
 /// Bias and scatter of some hypotheses, segment after segment.
@@ -111,8 +149,8 @@ impl Residuals {
         }
     }
 
-    /// Scatter of gravity in a segment under each hypothesis with the bias that suits it best so far, g^2.
-    pub(super) fn push(&mut self, segment: &Segment) -> Vec<f64> {
+    /// Scatter of gravity in a segment under each hypothesis with the bias that suits it best so far.
+    pub(super) fn push(&mut self, segment: &Segment) -> Row {
         // What is older than the memory counts less and less: a bias changes.
         let kept = match self.count < MEMORY {
             true => 1.0,
@@ -121,7 +159,9 @@ impl Residuals {
         self.count += 1;
         let prior = Matrix3::from_diagonal_element(1e-4 / segment.bias_sigma.powi(2));
         let sums = self.normal.iter_mut().zip(&mut self.slope);
-        sums.zip(BANK.iter())
+        let mut wanders = None;
+        let of = sums
+            .zip(BANK.iter())
             .map(|((normal, slope), hypothesis)| {
                 let found = segment.scatter::<3>(&hypothesis.map, &[], &Vector3::zeros());
                 let weight = 1.0 / (1.0 + found.s / 1e-3);
@@ -129,9 +169,16 @@ impl Residuals {
                 *slope = *slope * kept + found.b * weight;
                 let inverse = (*normal + prior).try_inverse();
                 let bias = inverse.map_or_else(Vector3::zeros, |inverse| inverse * *slope);
-                found.at(&bias).max(1e-8)
+                let missing = (LEAST_GRAVITY - found.gravity).max(0.0);
+                let s = found.at(&bias).max(1e-8);
+                wanders.get_or_insert(s);
+                s + missing * missing
             })
-            .collect()
+            .collect();
+        Row {
+            of,
+            wanders: wanders.unwrap_or(0.0),
+        }
     }
 }
 
@@ -166,7 +213,7 @@ pub(super) struct Verdict {
 #[derive(Clone, Debug)]
 pub(super) struct Evidence {
     residuals: Residuals,
-    rows: VecDeque<Vec<f64>>,
+    rows: VecDeque<Row>,
     sums: Vec<f64>,
 }
 
@@ -203,7 +250,7 @@ impl Evidence {
         }
         let near = self.near(best);
         let chosen = self.simplest(&near)?;
-        let telling: Vec<&Vec<f64>> = self
+        let telling: Vec<&Row> = self
             .rows
             .iter()
             .filter(|row| evidence_of(row, chosen).abs() > TELLING)
@@ -215,23 +262,24 @@ impl Evidence {
             .iter()
             .filter(|row| evidence_of(row, chosen) > 0.0)
             .count();
-        let (identity, found) = (
-            median_scatter(&telling, 0),
-            median_scatter(&telling, chosen),
-        );
+        let scatter_of = |h: usize| median_scatter(telling.iter().filter_map(|row| row.of.get(h)));
+        let found = scatter_of(chosen);
         let share = agree as f64 / telling.len() as f64;
         let (evidence, nothing) = (self.sums[chosen], self.sums[MAPS]);
         let has_peak = evidence - nothing >= (0.15 * evidence).max(4.0);
+        let wanders = median_scatter(telling.iter().map(|row| &row.wanders));
+        let identity = if has_peak { scatter_of(0) } else { wanders };
         let factor = BANK.get(chosen)?.factor;
         let least = match factor {
             None => LEAST_IDENTITY,
             Some(factor) if factor > 1.0 || (factor < UNIT_BELOW && has_peak) => LEAST_IDENTITY,
             Some(_) => LEAST_IDENTITY_LESS,
         };
+        let stands_still = found <= LARGEST_FOUND && found <= LARGEST_RATIO * identity;
+        let stands_out = found <= LARGEST_FOUND_SHAKEN && found <= LARGEST_RATIO_SHAKEN * identity;
         let is_clear = evidence >= LEAST_EVIDENCE
             && share >= LEAST_SHARE
-            && found <= LARGEST_FOUND
-            && found <= LARGEST_RATIO * identity
+            && (stands_still || (has_peak && stands_out))
             && identity >= least;
         is_clear.then(|| Verdict {
             answer: match (has_peak, factor) {
@@ -241,7 +289,7 @@ impl Evidence {
             },
             hypothesis: chosen,
             evidence,
-            identity,
+            identity: wanders,
             found,
             share,
             segments: telling.len(),
@@ -282,14 +330,14 @@ impl Evidence {
 }
 
 /// Evidence of a segment for a hypothesis against the identity.
-fn evidence_of(row: &[f64], h: usize) -> f64 {
-    let of = |h: usize| row.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
+fn evidence_of(row: &Row, h: usize) -> f64 {
+    let of = |h: usize| row.of.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
     (of(0) / of(h)).ln().clamp(-CLIP, CLIP)
 }
 
-/// Median scatter under a hypothesis, g.
-fn median_scatter(rows: &[&Vec<f64>], h: usize) -> f64 {
-    let mut all: Vec<f64> = rows.iter().filter_map(|row| row.get(h).copied()).collect();
+/// Median of some scatters, g.
+fn median_scatter<'a>(squares: impl Iterator<Item = &'a f64>) -> f64 {
+    let mut all: Vec<f64> = squares.copied().collect();
     median(&mut all).sqrt()
 }
 

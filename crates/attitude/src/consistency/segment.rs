@@ -59,6 +59,8 @@ pub(super) struct Scatter<const P: usize> {
     pub(super) b: SVector<f64, P>,
     /// Curvature.
     pub(super) a: SMatrix<f64, P, P>,
+    /// Length of the mean force in the integrated frame, g.
+    pub(super) gravity: f64,
 }
 
 impl<const P: usize> Scatter<P> {
@@ -238,5 +240,6 @@ fn without_lever_arm<const P: usize>(
         s: s * share,
         b: b * share,
         a: a * share,
+        gravity: mean_force.norm(),
     }
 }
