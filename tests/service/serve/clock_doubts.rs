@@ -67,6 +67,10 @@ fn a_clock_that_is_set_goes_on_and_is_said_and_one_of_another_speed_is_said() {
     );
     let what = finding(&status, "clock-speed")["what"].as_str().unwrap();
     assert!(what.contains("0.500 s"), "{what}");
+    // A sender that falls behind for a while, and goes on at its pace.
+    let behind = |n: i64| 87 * (STEP * n).min(11_000_000_000) / 1000;
+    let status = received(|n| nanos(T0 + STEP * n), |n| late(n) + behind(n));
+    assert_eq!(codes(&status, "imu0"), Vec::<String>::new(), "{status}");
     // As fast as it can be sent, and twice as fast as it was recorded at.
     let status = received(|n| nanos(T0 + STEP * n), |n| 1000 * n);
     assert_eq!(codes(&status, "imu0"), Vec::<String>::new());

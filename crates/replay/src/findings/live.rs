@@ -40,6 +40,8 @@ const SPEED_LEAST: i64 = 10_000_000_000;
 const SPEED_PACE: i64 = 60_000_000_000;
 const SPEED_SAMPLES: u64 = 320;
 const SPEED_MOST: u64 = 1 << 15;
+/// Difference of two stretches in a row up to which they tell of one clock. A sender that falls behind slows down.
+const SPEED_AGREES: f64 = 0.02;
 /// Scatter of a field, as a share of it, from which on it is worth a look at axes and iron: 0.01 of healthy sensors.
 const WANDERS: f64 = 0.03;
 /// Fields of zero after which they are no beginning of a driver.
@@ -71,6 +73,8 @@ struct SpeedWatch {
     /// Arrival at which it was judged last, and the finding.
     judged: i64,
     found: Option<Finding>,
+    /// Speed of a stretch that was wrong; the next one is to confirm it.
+    suspected: Option<f64>,
 }
 
 impl SpeedWatch {
@@ -79,6 +83,7 @@ impl SpeedWatch {
         if self.samples >= SPEED_MOST {
             *self = SpeedWatch {
                 found: self.found.take(),
+                suspected: self.suspected,
                 judged: arrival,
                 ..SpeedWatch::default()
             };
@@ -94,17 +99,34 @@ impl SpeedWatch {
         let since = self
             .last
             .saturating_sub(self.judged.max(self.first.unwrap_or_default()));
-        let pace = match self.judged {
-            0 => SPEED_LEAST,
+        let pace = match (self.judged, self.suspected) {
+            (0, _) | (_, Some(_)) => SPEED_LEAST,
             _ => SPEED_PACE,
         };
         if span >= SPEED_LEAST && self.samples >= SPEED_SAMPLES && since >= pace {
-            self.judged = self.last;
-            let found = self.pass.finish().filter(is_a_clock);
-            let said = found.as_ref().and_then(speed_message);
-            self.found = said.map(|said| Finding::said(Severity::Warning, "clock-speed", &said));
+            self.judge();
         }
         self.found.clone()
+    }
+
+    /// Judges the stretch since the last one that was wrong, or since the beginning; a wrong one begins the next.
+    fn judge(&mut self) {
+        let found = self.pass.finish().filter(is_a_clock);
+        let said = found.as_ref().and_then(speed_message);
+        let speed = found.filter(|_| said.is_some()).map(|found| found.speed);
+        let confirmed = speed
+            .zip(self.suspected)
+            .is_some_and(|(now, then)| (now / then - 1.0).abs() <= SPEED_AGREES);
+        let finding = said.map(|said| Finding::said(Severity::Warning, "clock-speed", &said));
+        *self = SpeedWatch {
+            found: finding.filter(|_| confirmed),
+            suspected: speed,
+            judged: self.last,
+            ..match speed {
+                Some(_) => SpeedWatch::default(),
+                None => std::mem::take(self),
+            }
+        };
     }
 }
 
