@@ -32,7 +32,6 @@ mod packed;
 #[cfg(unix)]
 mod pages;
 mod parquet;
-#[cfg(feature = "parquet")]
 mod parquet_in;
 #[cfg(target_os = "linux")]
 mod passes;

@@ -1,4 +1,5 @@
-//! `-o NAME.parquet`: a table that other people's programs read, with the bits of the CSV; and what a build without it says.
+//! `-o NAME.parquet`: a table that other people's programs read, with the bits of the CSV. What a build
+//! without it says: `.ci/run`.
 
 use crate::program::strapd;
 use std::path::Path;
@@ -10,31 +11,6 @@ fn fixture(name: &str) -> String {
     path.display().to_string()
 }
 
-#[cfg(not(feature = "parquet"))]
-#[test]
-fn a_build_without_the_feature_names_it_and_the_csv() {
-    let dir = tempfile::tempdir().unwrap();
-    let log = fixture("xsens_mti.mcap");
-    strapd(dir.path(), &format!("replay {log} -o out/run.parquet")).refused(
-        2,
-        &[
-            "-o out/run.parquet",
-            "without the feature parquet",
-            "build it with that feature",
-            "-o out/run.csv",
-        ],
-    );
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
-    let table = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/parquet/polars.parquet");
-    for command in ["replay", "info"] {
-        strapd(dir.path(), &format!("{command} {}", table.display())).refused(
-            1,
-            &["polars.parquet", "without the feature parquet", "duckdb -c"],
-        );
-    }
-}
-
-#[cfg(feature = "parquet")]
 mod built_with_it {
     use super::*;
     use std::process::Command;

@@ -404,7 +404,6 @@ fn what_promises_the_world_is_refused_or_lost_at_once() {
     strapd(at, "info t.parquet").refused(1, &["an encrypted Parquet file"]);
 }
 
-#[cfg(feature = "parquet")]
 #[test]
 fn what_strapd_wrote_is_read_back() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Addresses as inputs: the bits of the file, whatever the server does; and what a build without the feature says.
+//! Addresses as inputs: the bits of the file, whatever the server does. What a build without
+//! the feature says: `.ci/run`.
 
 use crate::program::strapd;
 use std::path::{Path, PathBuf};
@@ -9,43 +10,13 @@ fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-#[cfg(not(feature = "object-store"))]
-#[test]
-fn a_build_without_the_feature_names_it_and_the_pipe() {
-    let dir = tempfile::tempdir().unwrap();
-    for (address, pipe) in [
-        (
-            "https://h/a.mcap?sig=s3cret",
-            "curl -s https://h/a.mcap | strapd replay -",
-        ),
-        (
-            "s3://b/a.mcap",
-            "aws s3 cp s3://b/a.mcap - | strapd replay -",
-        ),
-    ] {
-        for command in ["replay -o null:", "info", "check", "cat"] {
-            let ran = strapd(dir.path(), &format!("{command} {address}"));
-            ran.refused(1, &["a build with the feature object-store", pipe]);
-            assert!(!ran.err.contains("s3cret"), "{}", ran.err);
-        }
-    }
-    assert!(fixture("xsens_mti.mcap").is_file());
-}
-
-#[cfg(feature = "object-store")]
 mod faults;
-#[cfg(feature = "object-store")]
 mod patterns;
-#[cfg(feature = "object-store")]
 mod secrets;
-#[cfg(feature = "object-store")]
 mod server;
-#[cfg(feature = "object-store")]
 mod sparse;
-#[cfg(feature = "object-store")]
 mod uploads;
 
-#[cfg(feature = "object-store")]
 mod built_with_it {
     use super::server::{Manner, Server};
     use super::*;

@@ -166,7 +166,6 @@ fn tables() {
     survives("delimited", cases() / 3, crate::parsers::delimited);
 }
 
-#[cfg(feature = "parquet")]
 #[test]
 fn tables_by_columns() {
     // Each is put into a file first.
@@ -174,7 +173,6 @@ fn tables_by_columns() {
 }
 
 /// Every beginning of one, and every one with a byte at its end.
-#[cfg(feature = "parquet")]
 #[test]
 fn tables_by_columns_cut_anywhere() {
     for seed in seeds("parquet").iter().step_by(7) {

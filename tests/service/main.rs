@@ -3,7 +3,6 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[cfg(any(feature = "nats", feature = "zenoh"))]
 mod broker;
 mod cast;
 mod mqtt;

@@ -1,22 +1,8 @@
-//! NATS: a real server, fed and watched by a client nobody here wrote (`tests/oracles/nats_workers.py`); and what a
-//! build without it says.
+//! NATS: a real server, fed and watched by a client nobody here wrote (`tests/oracles/nats_workers.py`). What a
+//! build without it says: `.ci/run`.
 
 use crate::program::strapd;
 
-#[cfg(not(feature = "nats"))]
-#[test]
-fn a_build_without_the_feature_names_it_and_the_bridge() {
-    let dir = tempfile::tempdir().unwrap();
-    for arguments in [
-        "serve nats://127.0.0.1:4222/imu.*",
-        "serve -o nats://127.0.0.1:4222/att.{id}",
-    ] {
-        let words = ["without the feature nats", "nats sub", "--features nats"];
-        strapd(dir.path(), arguments).refused(2, &words);
-    }
-}
-
-#[cfg(feature = "nats")]
 mod built_with_it {
     use super::*;
     use crate::broker::judged;

@@ -197,7 +197,7 @@ fn a_hand_that_moves_fast_tells_axes_and_units_of_its_gyro() {
             "true rates are 0.017",
         ),
         ("--gyro-scale 0.01745329", "gyro-scale", "true rates are 5"),
-        ("--gyro-scale 1000", "gyro-scale", "true rates are 0.0010"),
+        ("--gyro-scale 1000", "gyro-scale", "true rates are 0.00099"),
     ] {
         let ran = strapd(dir.path(), &format!("check hand.csv --json {flags}"));
         let all: Value = serde_json::from_str(&ran.out).unwrap_or_else(|e| panic!("{e}: {ran:?}"));

@@ -239,10 +239,7 @@ fn every_format_is_there_with_the_bytes_of_the_file_when_it_is_whole() {
     let at = dir.path();
     long(at);
     let store = Store::of(Manner::Good);
-    let mut endings = vec!["mcap", "csv", "ndjson", "tum"];
-    if cfg!(feature = "parquet") {
-        endings.push("parquet");
-    }
+    let endings = ["mcap", "csv", "ndjson", "tum", "parquet"];
     let outputs: Vec<String> = endings
         .iter()
         .map(|e| format!("-o s3://bucket/day/{{stem}}.{e} -o here.{e}"))
