@@ -11,6 +11,8 @@
 //! | [`field`] | a time -> the magnetic field |
 //! | [`synthetic`] | a motion and a sensor's errors -> samples, and the truth beside them |
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 pub mod dh;
 mod double_double;
 mod elliptic;

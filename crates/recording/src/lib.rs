@@ -51,6 +51,8 @@
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
 //! | [`error`] | why a log cannot be read | |
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 pub mod address;
 pub mod attitude_line;
 mod bag;

@@ -19,6 +19,8 @@
 //!
 //! What the command, the daemon and the Python wheel share: no async runtime, no arguments, no terminal.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 pub mod config;
 pub mod error;
 mod field_watch;
