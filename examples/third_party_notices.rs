@@ -3,19 +3,20 @@
 //! ```sh
 //! cargo run --example third_party_notices > THIRD-PARTY-NOTICES.txt
 //! cargo run --example third_party_notices -- Cargo.toml python/Cargo.toml    # of all that these are linked from
+//! cargo run --example third_party_notices -- --target x86_64-pc-windows-gnu  # of the binary for another platform
 //! ```
 //!
 //! Permissive licences ask for one thing: that their text goes with the binary. So the text is taken
 //! from the very sources the binary is built from, and a crate that has none fails the run unless it at
 //! least names its licence. Texts that are alike stand once. `packaging/release` ships the result, and `python/build`.
 
-use serde_json::Value;
-use std::collections::{BTreeMap, BTreeSet};
-use std::error::Error;
-use std::path::Path;
-use std::process::Command;
+#[path = "linked_crates/metadata.rs"]
+mod linked_crates;
 
-type Outcome<T> = Result<T, Box<dyn Error>>;
+use linked_crates::{Outcome, asked, is_of_others, linked, list, metadata, text};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Names of licence files, in any case and with any ending. `COPYING` stands beside one and names
 /// what else could be chosen (zstd: the GPL).
@@ -30,75 +31,18 @@ struct Notice {
 }
 
 fn main() -> Outcome<()> {
-    let mut manifests: Vec<String> = std::env::args().skip(1).collect();
-    if manifests.is_empty() {
-        manifests.push("Cargo.toml".to_owned());
-    }
+    let asked = asked()?;
     // By name and version, so that what is in both halves of a wheel stands once.
     let mut notices = BTreeMap::new();
-    for manifest in &manifests {
-        for package in linked(&metadata(manifest)?)? {
+    for manifest in &asked.manifests {
+        let metadata = metadata(manifest, asked.target.as_deref())?;
+        for package in linked(&metadata)?.into_iter().filter(|p| is_of_others(p)) {
             let notice = notice(package)?;
             notices.insert(notice.name.clone(), notice);
         }
     }
     let notices: Vec<Notice> = notices.into_values().collect();
     write(&notices, &mut std::io::stdout().lock())
-}
-
-fn metadata(manifest: &str) -> Outcome<Value> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let version = Command::new(&cargo).args(["-vV"]).output()?;
-    let host = String::from_utf8(version.stdout)?
-        .lines()
-        .find_map(|line| line.strip_prefix("host: ").map(str::to_owned))
-        .ok_or("`cargo -vV` names no host")?;
-    let out = Command::new(&cargo)
-        .args(["metadata", "--locked", "--format-version", "1"])
-        .args(["--filter-platform", &host])
-        .args(["--manifest-path", manifest])
-        .output()?;
-    if !out.status.success() {
-        return Err(String::from_utf8_lossy(&out.stderr).into());
-    }
-    Ok(serde_json::from_slice(&out.stdout)?)
-}
-
-fn list<'a>(value: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
-    value[key].as_array().into_iter().flatten()
-}
-
-fn text<'a>(value: &'a Value, key: &str) -> &'a str {
-    value[key].as_str().unwrap_or_default()
-}
-
-/// Every package the binary is linked from, but for our own: normal dependencies, all the way down.
-fn linked(metadata: &Value) -> Outcome<Vec<&Value>> {
-    let resolve = &metadata["resolve"];
-    let nodes: BTreeMap<&str, &Value> =
-        list(resolve, "nodes").map(|n| (text(n, "id"), n)).collect();
-    let root = resolve["root"].as_str().ok_or("there is no root package")?;
-    let mut seen = BTreeSet::new();
-    let mut next = vec![root];
-    while let Some(id) = next.pop() {
-        if seen.insert(id) {
-            let node = nodes.get(id).ok_or("a package without a node")?;
-            next.extend(
-                list(node, "deps")
-                    .filter(|dep| list(dep, "dep_kinds").any(|kind| kind["kind"].is_null()))
-                    .map(|dep| text(dep, "pkg")),
-            );
-        }
-    }
-    let linked: Vec<_> = list(metadata, "packages")
-        .filter(|package| seen.contains(text(package, "id")))
-        .collect();
-    if linked.len() < seen.len() {
-        return Err("a dependency is not among the packages".into());
-    }
-    // What comes from no registry is ours.
-    let of_others = |package: &&Value| !package["source"].is_null();
-    Ok(linked.into_iter().filter(of_others).collect())
 }
 
 fn notice(package: &Value) -> Outcome<Notice> {
