@@ -39,6 +39,7 @@ mod px4;
 mod recover;
 mod regularise;
 mod relative;
+mod release;
 mod replay;
 mod report;
 mod rosbag2;

@@ -27,17 +27,19 @@ const ELSEWHERE: [(&str, &str); 3] = [
 ];
 
 /// Number of lines of a page that are not run here. A line more is to be looked at.
-const UNTESTED: [(&str, usize); 10] = [
-    ("README.md", 3),
+const UNTESTED: [(&str, usize); 12] = [
+    ("README.md", 5),
     ("docs/connect.md", 4),
     ("docs/estimation.md", 1),
     ("docs/inputs.md", 3),
+    ("docs/install.md", 1),
     ("docs/joint.md", 4),
     ("docs/performance.md", 10),
     ("docs/protocol.md", 8),
     ("docs/python.md", 6),
     ("docs/scale.md", 8),
     ("docs/usage.md", 5),
+    ("docs/versions.md", 4),
 ];
 
 fn root() -> PathBuf {
