@@ -14,6 +14,7 @@ mod linked_crates;
 use linked_crates::{Outcome, asked, is_of_others, linked, list, metadata, text, used};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::io::Write;
 
 /// Checksums of the lock file, by name and version.
 type Checksums = BTreeMap<(String, String), String>;
@@ -25,7 +26,8 @@ fn main() -> Outcome<()> {
     };
     let metadata = metadata(manifest, asked.target.as_deref())?;
     let bill = bill(&metadata, &checksums()?)?;
-    println!("{}", serde_json::to_string_pretty(&bill)?);
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", serde_json::to_string_pretty(&bill)?)?;
     Ok(())
 }
 

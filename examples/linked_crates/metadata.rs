@@ -4,18 +4,18 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
-pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// What an example is asked for: `[--target TRIPLE] [MANIFEST...]`.
-pub struct Asked {
+/// Arguments of an example: `[--target TRIPLE] [MANIFEST...]`.
+pub(crate) struct Asked {
     /// Platform of the binary; this machine's where none is named.
-    pub target: Option<String>,
-    /// What is linked, `Cargo.toml` where none is named.
-    pub manifests: Vec<String>,
+    pub(crate) target: Option<String>,
+    /// Manifests of what is linked, `Cargo.toml` where none is named.
+    pub(crate) manifests: Vec<String>,
 }
 
 /// The arguments of the process.
-pub fn asked() -> Outcome<Asked> {
+pub(crate) fn asked() -> Outcome<Asked> {
     let mut asked = Asked {
         target: None,
         manifests: Vec::new(),
@@ -45,7 +45,7 @@ fn host() -> Outcome<String> {
 }
 
 /// The packages of a manifest and how they use each other, on one platform, as `cargo metadata` tells them.
-pub fn metadata(manifest: &str, target: Option<&str>) -> Outcome<Value> {
+pub(crate) fn metadata(manifest: &str, target: Option<&str>) -> Outcome<Value> {
     let target = target.map_or_else(host, |named| Ok(named.to_owned()))?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let out = Command::new(&cargo)
@@ -60,17 +60,17 @@ pub fn metadata(manifest: &str, target: Option<&str>) -> Outcome<Value> {
 }
 
 /// The elements of a list, none where there is no such key.
-pub fn list<'a>(value: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
+pub(crate) fn list<'a>(value: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
     value[key].as_array().into_iter().flatten()
 }
 
 /// The text of a key, empty where there is none.
-pub fn text<'a>(value: &'a Value, key: &str) -> &'a str {
+pub(crate) fn text<'a>(value: &'a Value, key: &str) -> &'a str {
     value[key].as_str().unwrap_or_default()
 }
 
 /// Every package the binary is linked from, our own among them: normal dependencies, all the way down.
-pub fn linked(metadata: &Value) -> Outcome<Vec<&Value>> {
+pub(crate) fn linked(metadata: &Value) -> Outcome<Vec<&Value>> {
     let resolve = &metadata["resolve"];
     let nodes: BTreeMap<&str, &Value> =
         list(resolve, "nodes").map(|n| (text(n, "id"), n)).collect();
@@ -93,13 +93,13 @@ pub fn linked(metadata: &Value) -> Outcome<Vec<&Value>> {
 }
 
 /// The packages that one uses when it runs, by their identifiers.
-pub fn used(node: &Value) -> impl Iterator<Item = &str> {
+pub(crate) fn used(node: &Value) -> impl Iterator<Item = &str> {
     list(node, "deps")
         .filter(|dep| list(dep, "dep_kinds").any(|kind| kind["kind"].is_null()))
         .map(|dep| text(dep, "pkg"))
 }
 
 /// Whether a package comes from a registry. What does not is ours.
-pub fn is_of_others(package: &Value) -> bool {
+pub(crate) fn is_of_others(package: &Value) -> bool {
     !package["source"].is_null()
 }

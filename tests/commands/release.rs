@@ -62,7 +62,7 @@ fn no_page_of_the_book_leads_out_of_it() {
     }
 }
 
-/// What tells the version apart from Cargo.toml is a copy that drifts.
+/// Copies of the version drift from the one of Cargo.toml.
 #[test]
 fn the_version_is_the_same_wherever_it_has_to_stand() {
     let version = env!("CARGO_PKG_VERSION");
@@ -108,7 +108,7 @@ fn the_version_is_the_same_wherever_it_has_to_stand() {
     }
 }
 
-/// Who installs by another way gets the archives that `packaging/release` makes.
+/// Installers of other kinds get the archives that `packaging/release` makes.
 #[test]
 fn installers_fetch_what_the_release_makes() {
     let cargo: toml::Table = read("Cargo.toml").parse().unwrap();
