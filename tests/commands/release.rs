@@ -141,3 +141,42 @@ fn installers_fetch_what_the_release_makes() {
         );
     }
 }
+
+/// A path in an image or a package that nothing makes is found here, and not by who builds it.
+#[test]
+fn image_and_package_hold_what_the_release_makes() {
+    let image = read("packaging/Containerfile");
+    let released = read("packaging/release");
+    let copied: Vec<&str> = image
+        .lines()
+        .filter_map(|line| line.strip_prefix("COPY --from=build /strapd/target/dist/"))
+        .filter_map(|rest| rest.split(' ').next())
+        .collect();
+    assert_eq!(copied.len(), 2, "{copied:?}");
+    for file in copied {
+        assert!(released.contains(&format!("$dist/{file}")), "{file}");
+    }
+
+    let cargo: toml::Table = read("Cargo.toml").parse().unwrap();
+    let archive = read("packaging/archive");
+    let system = std::fs::read_dir(root().join("packaging")).unwrap();
+    let system: BTreeSet<String> = system
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let assets = cargo["package"]["metadata"]["deb"]["assets"]
+        .as_array()
+        .unwrap();
+    for asset in assets {
+        let path = asset[0].as_str().unwrap();
+        let laid = path.strip_prefix("target/dist/deb/").unwrap();
+        let is_made = match laid.split_once('/') {
+            Some(("system", unit)) => system.contains(unit),
+            Some((folder, _)) => {
+                archive.contains(&format!("$folder/{folder}"))
+                    || archive.contains("{completions,man}")
+            }
+            None => laid == "strapd" || archive.contains(laid),
+        };
+        assert!(is_made, "{path}");
+    }
+}
