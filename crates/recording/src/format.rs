@@ -5,9 +5,10 @@
 
 use crate::error::{Error, Result};
 use crate::records::MAGIC;
+pub(crate) use crate::records::transcript::HEAD;
 use crate::records::transcript::Transcribe;
 use crate::text::without_mark;
-use crate::{bag, dataflash, delimited, gpmf, mavlink, parquet, recognise, sqlite, ulog};
+use crate::{bag, dataflash, delimited, devices, gpmf, mavlink, parquet, recognise, sqlite, ulog};
 use std::fs::File;
 use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -30,6 +31,8 @@ pub enum Format {
     Tlog,
     /// Frames of MAVLink as they came over a link.
     Mavlink,
+    /// Frames of an inertial sensor as they came over a link.
+    Device,
     /// A log of ArduPilot's flight controllers.
     DataFlash,
     /// One JSON object per line.
@@ -156,6 +159,17 @@ const ROWS: &[Row] = &[
         ..LOG
     },
     Row {
+        format: Format::Device,
+        name: "sensor capture",
+        magic: &[],
+        looks_like: devices::is_capture,
+        may_look_like: devices::may_be_capture,
+        // Nobody has one for it.
+        endings: &[],
+        reading: Reading::Transcribed(|| Box::new(devices::Transcriber::default())),
+        ..LOG
+    },
+    Row {
         format: Format::DataFlash,
         name: "ArduPilot DataFlash",
         magic: &dataflash::MAGIC,
@@ -209,9 +223,6 @@ pub(crate) const LONGEST_MAGIC: usize = {
 
 /// Mark of a video, behind four bytes.
 const VIDEO: &[u8] = b"ftyp";
-
-/// Bytes that are looked at: the first line of a table is shorter.
-pub(crate) const HEAD: usize = 4096;
 
 impl Format {
     /// The formats that are read, in the order in which texts list them.

@@ -41,6 +41,7 @@
 //! | `rosbag2` | recordings of ROS 2 in SQLite -> the records MCAP has for them | pure |
 //! | `gpmf` | telemetry of GoPro's cameras, alone or in a video -> the records MCAP has for it | pure |
 //! | [`mavlink`] | telemetry logs of ground stations -> the records MCAP has for them | pure |
+//! | [`devices`] | frames of inertial sensors, live or captured -> lines, or the records MCAP has for them | pure |
 //! | `dataflash` | logs of ArduPilot's flight controllers -> the records MCAP has for them | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
@@ -60,6 +61,7 @@ mod columns;
 mod dataflash;
 pub mod decode;
 pub mod delimited;
+pub mod devices;
 pub mod error;
 pub mod format;
 mod gpmf;

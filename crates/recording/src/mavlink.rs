@@ -18,6 +18,6 @@ mod sequence;
 mod transcriber;
 
 pub use frame::checksum;
-pub(crate) use frame::{is_capture, is_log, may_be_capture, may_be_log};
+pub(crate) use frame::{cut, is_capture, is_log, may_be_capture, may_be_log};
 pub use link::Link;
 pub(crate) use transcriber::Transcriber;

@@ -4,6 +4,7 @@
 
 mod bytes;
 pub mod cdr;
+pub(crate) mod cut;
 pub mod imu;
 pub(crate) mod problem;
 pub mod record;

@@ -3,6 +3,7 @@
 //! Apart because both versions of the protocol may take turns in one log, and end as the same here.
 
 use super::message::checksum_of;
+use crate::records::cut::Cut;
 use std::collections::BTreeMap;
 
 /// Bytes of the time before each frame of a log; a capture has none.
@@ -156,6 +157,21 @@ pub(super) fn frame(bytes: &[u8], stamp: usize) -> Result<Frame<'_>, Option<usiz
         total,
         checked,
     })
+}
+
+/// Cuts a frame of a link: one whose checksum is right, for none else is known to be one.
+pub(crate) fn cut(bytes: &[u8]) -> Cut {
+    match frame(bytes, 0) {
+        Err(Some(need)) => Cut::Need(need),
+        Err(None) => Cut::No,
+        Ok(found) => match found.checked {
+            Checked::Wrong => Cut::No,
+            checked => Cut::Frame {
+                total: found.total,
+                tells: checked == Checked::Right,
+            },
+        },
+    }
 }
 
 /// Checksum of a frame without its first byte; `extra` is the byte made of the fields of its message.

@@ -231,6 +231,11 @@ pub enum ProblemKind {
         /// Number of frames.
         count: u64,
     },
+    /// Samples in which the device reports an axis at the end of its range.
+    Clipped {
+        /// Number of samples.
+        count: u64,
+    },
     /// A file beside a database says that a change of it was not ended.
     Journal,
     /// The summary at the end cannot be used; nothing is lost by that.
@@ -399,6 +404,10 @@ impl fmt::Display for ProblemKind {
             ProblemKind::FramesMissing { count } => {
                 write!(f, "{count} frames that the sender has numbered are missing")
             }
+            ProblemKind::Clipped { count } => write!(
+                f,
+                "the device reports {count} samples with an axis at the end of its range"
+            ),
             ProblemKind::Journal => write!(
                 f,
                 "a file -journal beside the database says that it is in the middle of a change; `sqlite3 FILE .tables` puts it right"
