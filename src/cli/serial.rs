@@ -15,7 +15,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::record::Nanos;
 use strapd_recording::decode::framing::{Framed, Framer};
+use strapd_recording::devices::{self, Asked};
+use strapd_recording::format::Format;
 use tempfile::TempDir;
 use tokio::time::{Instant, timeout_at};
 
@@ -88,11 +91,12 @@ pub(super) fn captured(path: &Path, seconds: Option<f64>) -> Result<Captured> {
         });
     }
     let text = path.to_str().unwrap_or_default();
-    let (place, stated) = parsed(text)?;
+    let (place, stated, protocol) = parsed(text)?;
     let seconds = seconds.or(stated).unwrap_or(SECONDS);
     tracing::info!("{place}: listening for {seconds} s");
-    let bytes = client::run(text, listened(&place, Duration::from_secs_f64(seconds)))?;
-    let kept = lines_of(&bytes);
+    let time = Duration::from_secs_f64(seconds);
+    let bytes = client::run(text, listened(&place, time, protocol))?;
+    let kept = kept_of(&place, bytes, protocol)?;
     let folder = TempDir::new().map_err(|e| Error::writing("a temporary folder", e))?;
     let path = folder.path().join(format!("{}.txt", place.sensor()));
     std::fs::File::create(&path)
@@ -100,23 +104,32 @@ pub(super) fn captured(path: &Path, seconds: Option<f64>) -> Result<Captured> {
         .map_err(|e| Error::writing("a temporary file", e))?;
     Ok(Captured {
         path,
-        address: Some(place.to_string()),
+        address: Some(addressed(&place, protocol)),
         _folder: Some(folder),
     })
 }
 
-/// The port of an address, and its `?for=`.
-fn parsed(text: &str) -> Result<(SerialPlace, Option<f64>)> {
+/// The port of an address, its `?for=` and its `?protocol=`.
+fn parsed(text: &str) -> Result<(SerialPlace, Option<f64>, Asked)> {
     let refuse = |what: String| {
         let what = format!("{}: {what}", crate::address::Address::from(text));
-        Error::usage(Diagnostic::new(what).help("serial:///dev/PORT?baud=RATE&for=SECONDS"))
+        let help = format!(
+            "serial:///dev/PORT?baud=RATE&for=SECONDS&protocol=NAME; protocols: {}",
+            Asked::names()
+        );
+        Error::usage(Diagnostic::new(what).help(help))
     };
     let (remote, parameters) = Remote::with_parameters(text, |_| true)?;
     let Remote::Serial(place) = remote else {
         return Err(refuse("is no serial port".to_owned()));
     };
-    let mut seconds = None;
+    let (mut seconds, mut protocol) = (None, Asked::Lines);
     for (name, value) in parameters {
+        if name == "protocol" {
+            let asked = Asked::parse(&value);
+            protocol = asked.map_err(|why| refuse(format!("?protocol={why}")))?;
+            continue;
+        }
         let value: Option<f64> = value.parse().ok().filter(|v| (0.1..=86_400.0).contains(v));
         match (name.as_str(), value) {
             ("for", Some(value)) => seconds = Some(value),
@@ -127,7 +140,7 @@ fn parsed(text: &str) -> Result<(SerialPlace, Option<f64>)> {
             }
         }
     }
-    Ok((place, seconds))
+    Ok((place, seconds, protocol))
 }
 
 fn failed(place: &SerialPlace, what: String) -> Error {
@@ -137,7 +150,7 @@ fn failed(place: &SerialPlace, what: String) -> Error {
     }
 }
 
-async fn listened(place: &SerialPlace, time: Duration) -> Result<Vec<u8>> {
+async fn listened(place: &SerialPlace, time: Duration, protocol: Asked) -> Result<Vec<u8>> {
     let remote = Remote::Serial(place.clone());
     let link = Link::connect(&remote, None, MAX_MESSAGE).await;
     let mut link = link.map_err(|why| failed(place, why))?;
@@ -163,10 +176,57 @@ async fn listened(place: &SerialPlace, time: Duration) -> Result<Vec<u8>> {
                 time.as_secs_f64()
             ),
         )),
-        bytes if !seen.is_text() => Err(failed(place, place.unreadable(bytes))),
+        bytes if protocol.is_lines() && !seen.is_text() => {
+            Err(failed(place, place.unreadable(bytes)))
+        }
         _ => Ok(all),
     }
 }
+
+/// Bytes of a port that are kept: of a sensor's frames all, of other frames lines of their samples, of lines those that
+/// may be samples.
+fn kept_of(place: &SerialPlace, bytes: Vec<u8>, protocol: Asked) -> Result<Vec<u8>> {
+    let Some(mut link) = devices::Link::of(protocol) else {
+        return Ok(lines_of(&bytes));
+    };
+    let mut lines = Vec::new();
+    // All of it came by the end; frames without a time have none here.
+    link.push(&bytes, Nanos(0), None, &mut lines);
+    link.push(&[], Nanos(LATE), None, &mut lines);
+    link.finish(&mut lines);
+    let notes = link.notes();
+    for note in &notes {
+        tracing::info!("{place}: {}", note.text);
+    }
+    let (has_frames, head) = (link.has_frames(), bytes.get(..CAPTURE_HEAD));
+    if has_frames && link.counts().0 > 0 {
+        let is_capture = Format::of_bytes(head.unwrap_or(&bytes)) == Some(Format::Device);
+        return Ok(if is_capture { bytes } else { lines });
+    }
+    if has_frames || lines.is_empty() {
+        let why = notes.last().map(|note| note.text.clone());
+        let why = why.unwrap_or_else(|| "no sample in what came".to_owned());
+        return Err(failed(place, why));
+    }
+    Ok(lines_of(&lines))
+}
+
+/// The address of a port with the protocol that is asked for.
+fn addressed(place: &SerialPlace, protocol: Asked) -> String {
+    let address = place.to_string();
+    match protocol {
+        Asked::Lines => address,
+        asked => {
+            let mark = if address.contains('?') { '&' } else { '?' };
+            format!("{address}{mark}protocol={}", asked.name())
+        }
+    }
+}
+
+/// Bytes by which a capture is recognised.
+const CAPTURE_HEAD: usize = 4096;
+/// Time after which a protocol must have shown itself, ns.
+const LATE: i64 = 10_000_000_000;
 
 /// Whole lines of a capture that may be samples: the first one may be half of one, the last one is, and a board says
 /// what it is before it sends objects.
@@ -193,16 +253,16 @@ fn lines_of(bytes: &[u8]) -> Vec<u8> {
 /// The port cannot be opened; nobody answers, or whoever answered has gone.
 pub(super) fn forward(port: &Path, remote: &Remote, token: Option<&Secret>) -> Result<Outcome> {
     let text = port.to_str().unwrap_or_default();
-    let (place, seconds) = parsed(text)?;
+    let (place, seconds, protocol) = parsed(text)?;
     client::run(
         &format!("send {text}"),
-        forwarded(&place, seconds, remote, token),
+        forwarded(&place, (seconds, protocol), remote, token),
     )
 }
 
 async fn forwarded(
     place: &SerialPlace,
-    seconds: Option<f64>,
+    (seconds, protocol): (Option<f64>, Asked),
     remote: &Remote,
     token: Option<&Secret>,
 ) -> Result<Outcome> {
@@ -220,6 +280,7 @@ async fn forwarded(
     let mut sender = Sender::connect(remote, token).await.map_err(gone)?;
     let (mut framer, mut bytes, mut lines, mut count) =
         (Framer::new(), Vec::new(), String::new(), 0u64);
+    let (mut link, began) = (devices::Link::of(protocol), Instant::now());
     loop {
         let heard = tokio::select! {
             heard = port.read(&mut bytes) => heard,
@@ -230,6 +291,15 @@ async fn forwarded(
             Ok(Heard::Bytes | Heard::Message) => {}
             Ok(Heard::Closed(_)) => return Err(failed(place, "the port has gone".to_owned())),
             Err(why) => return Err(failed(place, why.to_string())),
+        }
+        if let Some(link) = &mut link {
+            let elapsed = i64::try_from(began.elapsed().as_nanos()).unwrap_or(i64::MAX);
+            let mut own = Vec::new();
+            link.push(&bytes, Nanos(elapsed), Some(&place.sensor()), &mut own);
+            for note in link.notes() {
+                tracing::warn!("{place}: {}", note.text);
+            }
+            bytes = own;
         }
         framer.feed(&bytes, &mut |framed: Framed<'_>| {
             if let Framed::Line(_, line) = framed {
@@ -267,8 +337,12 @@ mod tests {
 
     #[test]
     fn an_address_of_a_port_says_for_how_long() {
-        let (place, seconds) = parsed("serial:///dev/ttyUSB0?baud=9600&for=2.5").unwrap();
-        assert_eq!((place.baud, seconds), (9600, Some(2.5)));
+        let (place, seconds, protocol) =
+            parsed("serial:///dev/ttyUSB0?baud=9600&for=2.5&protocol=auto").unwrap();
+        assert_eq!(
+            (place.baud, seconds, protocol),
+            (9600, Some(2.5), Asked::Auto)
+        );
         for text in [
             "serial:///dev/a?for=x",
             "serial:///dev/a?stamp=arrival",

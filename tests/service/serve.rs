@@ -17,6 +17,7 @@ mod clients;
 mod clock_doubts;
 mod config;
 mod connecting;
+mod devices;
 mod documentation;
 mod doubts;
 mod faults;

@@ -5,6 +5,7 @@
 use crate::serve::protocol::wire::MAX_ID;
 use strapd_recording::decode::{LineDecoder, Options, exact_name};
 use strapd_recording::delimited::{Columns, Delimiter, RowFilter};
+use strapd_recording::devices::Asked;
 
 /// Parameters of an address that say how its lines are read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,15 +20,15 @@ pub struct LineParameters {
     pub rows: Vec<RowFilter>,
     /// Whether a sample without a stamp has that of its arrival (`?stamp=arrival`).
     pub by_arrival: bool,
-    /// Whether its bytes are frames of MAVLink (`?protocol=mavlink`).
-    pub is_mavlink: bool,
+    /// Protocol of its bytes (`?protocol=`).
+    pub protocol: Asked,
 }
 
 impl LineParameters {
     /// Names of the parameters.
     pub const KEYS: [&str; 6] = ["id", "columns", "delimiter", "where", "stamp", "protocol"];
     /// Help for an address with others.
-    pub const HELP: &str = "?id=NAME names the sensor; ?columns=ROLE=NAMES,..., ?delimiter=MARK and ?where=COLUMN=VALUE read rows of a table; ?stamp=arrival stamps samples without a stamp when they come; ?protocol=mavlink reads frames of MAVLink";
+    pub const HELP: &str = "?id=NAME names the sensor; ?columns=ROLE=NAMES,..., ?delimiter=MARK and ?where=COLUMN=VALUE read rows of a table; ?stamp=arrival stamps samples without a stamp when they come; ?protocol=NAME reads frames of an autopilot or sensor";
 
     /// Reads the parameters among those of an address.
     ///
@@ -70,13 +71,9 @@ impl LineParameters {
                     return Err(format!("?stamp={other}: arrival is the one there is"));
                 }
             },
-            is_mavlink: match of("protocol")? {
-                None | Some("lines") => false,
-                Some("mavlink") => true,
-                Some(other) => {
-                    let other = strapd_recording::text::printable(other);
-                    return Err(format!("?protocol={other}: mavlink or lines"));
-                }
+            protocol: match of("protocol")? {
+                None => Asked::Lines,
+                Some(name) => Asked::parse(name).map_err(|why| format!("?protocol={why}"))?,
             },
         })
     }
@@ -95,7 +92,10 @@ impl LineParameters {
                 false => self.rows,
             },
             by_arrival: self.by_arrival || by_default.by_arrival,
-            is_mavlink: self.is_mavlink || by_default.is_mavlink,
+            protocol: match self.protocol {
+                Asked::Lines => by_default.protocol,
+                stated => stated,
+            },
         }
     }
 }
@@ -111,8 +111,8 @@ pub struct Reading {
     pub(super) decoder: LineDecoder,
     /// Whether a sample without a stamp has that of its arrival.
     pub(super) by_arrival: bool,
-    /// Whether its bytes are frames of MAVLink.
-    pub(super) is_mavlink: bool,
+    /// Protocol of its bytes.
+    pub(super) protocol: Asked,
     /// Whether lines that are no objects may be rows of a table.
     takes_rows: bool,
     /// Whether the bytes may begin within a line.
@@ -134,8 +134,8 @@ impl Reading {
             decoder: LineDecoder::new(&options).with_besides(),
             options,
             by_arrival: asked.by_arrival,
-            is_mavlink: asked.is_mavlink,
-            takes_rows: !asked.is_mavlink,
+            protocol: asked.protocol,
+            takes_rows: matches!(asked.protocol, Asked::Lines | Asked::Auto),
             is_midway: false,
         }
     }
@@ -194,7 +194,11 @@ mod tests {
             ("delimiter=7", "?delimiter=: one of tab"),
             ("where=device", "?where=: `device` is no COLUMN=VALUE"),
             ("stamp=ntp", "?stamp=ntp: arrival"),
-            ("protocol=morse", "?protocol=morse: mavlink or lines"),
+            (
+                "protocol=morse",
+                "?protocol=morse: one of auto, mavlink, ximu3, xsens",
+            ),
+            ("protocol=bno08x-rvc", "no rate"),
         ] {
             let why = parsed(query).err().unwrap_or_default();
             assert!(why.contains(words), "{query}: {why}");

@@ -37,7 +37,7 @@ use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Line;
 use strapd_recording::decode::framing::Framer;
-use strapd_recording::mavlink::Link;
+use strapd_recording::devices::Link;
 use turn::{PendingBytes, WorkSlice};
 
 /// Errors said at once before they are thinned.
@@ -179,7 +179,7 @@ impl Session {
     pub fn reading(mut self, reading: Arc<Reading>) -> Session {
         let are_taken = reading.takes_rows() && self.side.takes_rows();
         self.rows = Rows::taken(are_taken && self.hub.takes_samples());
-        self.link = reading.is_mavlink.then(Link::default);
+        self.link = Link::of(reading.protocol);
         self.reading = reading;
         self
     }
@@ -357,8 +357,10 @@ impl Session {
             return;
         };
         self.step.worked = true;
+        // A device without a clock has no other time.
+        let lacks_stamps = self.link.as_ref().is_some_and(Link::may_lack_stamps);
         let run = SampleRun {
-            by_arrival: self.reading.by_arrival,
+            by_arrival: self.reading.by_arrival || lacks_stamps,
             ..run
         };
         let news = self

@@ -101,10 +101,7 @@ async fn converse(
         asked: source.protocol == Protocol::Strapd,
         asked_again: false,
         flood: Flood::default(),
-        // What is no text is read by its frames.
-        legibility: serial(source)
-            .filter(|_| !source.lines.is_mavlink)
-            .map(|_| Legibility::default()),
+        legibility: serial(source).map(|_| Legibility::default()),
     };
     talk.go_on(running).await.err()
 }
@@ -173,7 +170,9 @@ impl Talk<'_> {
         let (Some(seen), Some(place)) = (self.legibility.take(), serial(self.source)) else {
             return;
         };
-        if seen.is_text() {
+        // What is no text is read by its frames, which say so themselves.
+        let has_lines = self.source.lines.protocol.is_lines();
+        if seen.is_text() || (!has_lines && seen.bytes() > 0) {
             return;
         }
         let what = match seen.bytes() {
@@ -185,7 +184,9 @@ impl Talk<'_> {
 
     /// Words for a serial port whose bytes are no text.
     fn unreadable(&self) -> Option<String> {
-        let seen = self.legibility.as_ref().filter(|seen| !seen.is_text())?;
+        let has_lines = self.source.lines.protocol.is_lines();
+        let seen = self.legibility.as_ref();
+        let seen = seen.filter(|seen| has_lines && !seen.is_text())?;
         Some(serial(self.source)?.unreadable(seen.bytes()))
     }
 

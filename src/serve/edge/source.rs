@@ -22,6 +22,7 @@ use crate::serve::core::reading::{LineParameters, Reading};
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::decode::{LineDecoder, Options};
+use strapd_recording::devices::Asked;
 use strapd_recording::text::printable;
 
 /// The parameters that are ours beside those of lines.
@@ -219,8 +220,9 @@ impl Source {
             let shown = Address::from(text);
             Error::usage(
                 Diagnostic::new(format!("serve {shown}: {what}")).help(format!(
-                    "{}; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE",
-                    LineParameters::HELP
+                    "{}; protocols: {}; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE",
+                    LineParameters::HELP,
+                    Asked::names()
                 )),
             )
         };
@@ -280,7 +282,10 @@ impl Source {
         }
         Ok(Source {
             // Of a link it goes before the names of its sensors.
-            id: lines.id.clone().filter(|_| !is_serial && !lines.is_mavlink),
+            id: lines
+                .id
+                .clone()
+                .filter(|_| !is_serial && lines.protocol.is_lines()),
             lines,
             protocol,
             token,

@@ -3,6 +3,7 @@
 
 use super::client::Client;
 use super::daemon::{Process, TCP, eventually, strapd};
+use super::devices::mip;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use std::fs::File;
@@ -137,6 +138,19 @@ fn a_wrong_rate_and_a_port_that_is_none_say_so_in_the_log() {
 
 /// Runs a command on a board that sends 200 rows a second for as long as it runs.
 fn output(args: &[&str], board: &mut Board) -> (Option<i32>, String) {
+    let head = format!("5,0.1\n{HEADER}\n");
+    let row = |n| Board::row(n).into_bytes();
+    let (code, text, _) = output_of(args, board, head.as_bytes(), row);
+    (code, text)
+}
+
+/// The same of a board that sends this, then so each sample; with what the command reports.
+fn output_of(
+    args: &[&str],
+    board: &mut Board,
+    head: &[u8],
+    sample: impl Fn(u64) -> Vec<u8>,
+) -> (Option<i32>, String, String) {
     let mut child = Command::new(strapd())
         .args(args)
         .stdout(Stdio::piped())
@@ -144,10 +158,10 @@ fn output(args: &[&str], board: &mut Board) -> (Option<i32>, String) {
         .spawn()
         .unwrap();
     std::thread::sleep(Duration::from_millis(1500));
-    board.send(&format!("5,0.1\n{HEADER}\n"));
+    board.wire.write_all(head).unwrap();
     let mut n = 0;
     let status = loop {
-        board.send(&Board::row(n));
+        board.wire.write_all(&sample(n)).unwrap();
         n += 1;
         std::thread::sleep(Duration::from_millis(5));
         if let Some(status) = child.try_wait().unwrap() {
@@ -155,9 +169,10 @@ fn output(args: &[&str], board: &mut Board) -> (Option<i32>, String) {
         }
         assert!(n < 12_000, "a minute, and no end");
     };
-    let mut text = String::new();
+    let (mut text, mut reported) = (String::new(), String::new());
     std::io::Read::read_to_string(&mut child.stdout.take().unwrap(), &mut text).unwrap();
-    (status.code(), text)
+    std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut reported).unwrap();
+    (status.code(), text, reported)
 }
 
 #[test]
@@ -187,6 +202,24 @@ fn a_port_is_a_recording_for_cat_info_and_check() {
         listed.status.success() && !listed.stdout.is_empty(),
         "{listed:?}"
     );
+}
+
+#[test]
+fn a_port_with_a_sensor_is_read_in_its_frames_or_named_for_what_it_is_not() {
+    let mut board = Board::new();
+    let port = board.port.display().to_string();
+    let mut ran = |command: &str, protocol: &str| {
+        let address = format!("serial://{port}?for=2&protocol={protocol}");
+        output_of(&[command, &address], &mut board, b"boot\r\n\x65\x80", mip)
+    };
+    let (code, text, reported) = ran("info", "auto");
+    assert!(matches!(code, Some(0 | 3)), "{text}{reported}");
+    assert!(text.contains("sensor capture"), "{text}");
+    assert!(text.contains("mip  sensor_msgs/msg/Imu"), "{text}");
+    assert!(text.contains("100.00 Hz"), "{text}");
+    let (code, _, reported) = ran("check", "xsens");
+    assert_eq!(code, Some(1), "{reported}");
+    assert!(reported.contains("no frame of Xsens MTData2"), "{reported}");
 }
 
 #[test]

@@ -4,24 +4,22 @@
 
 use super::Session;
 use crate::serve::guard::log_throttle;
+use strapd_attitude::record::Nanos;
 
 impl Session {
     /// Lines of the samples in these bytes; `None`: the bytes are lines themselves.
-    pub(super) fn lines_of_link(&mut self, bytes: &[u8]) -> Option<Vec<u8>> {
+    pub(super) fn lines_of_link(&mut self, bytes: &[u8], received: Nanos) -> Option<Vec<u8>> {
         let link = self.link.as_mut()?;
-        let (_, before) = link.counts();
         let mut lines = Vec::new();
-        link.push(bytes, self.reading.id.as_deref(), &mut lines);
-        let (frames, missing) = link.counts();
-        if missing > before {
-            let peer = &self.client.peer;
-            log_throttle::warn(
-                &format!("{peer} frames missing"),
-                &format!(
-                    "{peer}: {missing} frames that the sender has numbered did not come, of {}",
-                    frames + missing
-                ),
-            );
+        link.push(bytes, received, self.reading.id.as_deref(), &mut lines);
+        let peer = &self.client.peer;
+        for note in link.notes() {
+            let key = format!("{peer} {}", note.about);
+            let text = format!("{peer}: {}", note.text);
+            match note.is_warning {
+                true => log_throttle::warn(&key, &text),
+                false => log_throttle::info(&key, &text),
+            }
         }
         Some(lines)
     }

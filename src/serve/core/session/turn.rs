@@ -44,7 +44,7 @@ impl Session {
     /// The next bytes of the stream, received at `received`. Not all of them may be worked on: see
     /// [`Session::is_held`].
     pub fn bytes(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
-        match self.lines_of_link(bytes) {
+        match self.lines_of_link(bytes, received) {
             Some(lines) => self.add(&lines, false, received, scratch),
             None => self.add(bytes, false, received, scratch),
         }
@@ -52,7 +52,7 @@ impl Session {
 
     /// A datagram or message: its end ends its last line.
     pub fn message(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
-        match self.lines_of_link(bytes) {
+        match self.lines_of_link(bytes, received) {
             Some(lines) => self.add(&lines, true, received, scratch),
             None => self.add(bytes, true, received, scratch),
         }
@@ -61,7 +61,11 @@ impl Session {
     /// The stream has ended: what is unfinished is a line.
     pub fn finish(&mut self, received: Nanos, scratch: &mut Scratch) {
         self.has_ended = true;
-        self.add(&[], true, received, scratch);
+        let mut held = Vec::new();
+        if let Some(link) = &mut self.link {
+            link.finish(&mut held);
+        }
+        self.add(&held, true, received, scratch);
     }
 
     /// Whether something it sent waits for the next step, before which nothing more is to be read.
