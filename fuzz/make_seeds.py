@@ -196,6 +196,64 @@ while at < len(log):
 seed("mcap", "mavlink_capture", frames[:2500])
 
 
+
+# Frames of sensors, after their makers' protocol sheets.
+
+
+def xsens(n):
+    items = [(0x1020, ">H", n % 65536), (0x1060, ">I", 100 * n), (0x4020, ">3f", 0, 0.1, 9.8), (0x8020, ">3f", 0.01 * n, -0.5, 0.25)]
+    items += [(0xC020, ">3f", 1, 0.5, 0.25), (0x2010, ">4f", 1, 0, 0, 0), (0xE020, ">I", 7)]
+    body = b"".join(struct.pack(">HB", of, struct.calcsize(form)) + struct.pack(form, *values) for of, form, *values in items)
+    packet = b"\xff\x36" + bytes([len(body)]) + body
+    return b"\xfa" + packet + bytes([-sum(packet) % 256])
+
+
+def ximu3(n):
+    body = b"\xc9" + struct.pack("<Q6f", 10000 * n, 0.5 * n, -2, 3, 0, 0.1, 1)
+    stuffed = body.replace(b"\xdb", b"\xdb\xdd").replace(b"\n", b"\xdb\xdc") + b"\n"
+    return stuffed + b"M,%d,0.5,0.25,-0.5\r\n" % (10000 * n) + b"^A" + stuffed
+
+
+def witmotion(n):
+    frames = b""
+    for kind, numbers in ((0x50, (24 | 5 << 8, 17 | 8 << 8, n << 8, 0)), (0x51, (0, 0, 2048, 0)), (0x52, (n, -20, 30, 0)), (0x54, (100, -50, 9, 0))):
+        frame = b"\x55" + bytes([kind]) + struct.pack("<4h", *numbers)
+        frames += frame + bytes([sum(frame) % 256])
+    return frames
+
+
+def vectornav(n):
+    text = b"VNYMR,-165.981,-037.301,+001.245,+00.2901,+00.0720,+00.7482,-05.966,-00.150,-07.836,+00.001373,-00.001533,-00.001054"
+    check = 0
+    for byte in text:
+        check ^= byte
+    message = struct.pack("<BHHQ3f3fH", 0x05, 1 | 1 << 5, 1 << 9 | 1 << 11, 10_000_000 * n, 0.01 * n, -0.5, 0.25, 0, 0, -9.8, 0)
+    crc = 0
+    for byte in message:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return b"\xfa" + message + struct.pack(">H", crc) + b"$" + text + b"*%02X\r\n" % check
+
+
+def mip(n):
+    fields = ((0x04, ">3f", 0, 0, -1), (0x05, ">3f", 0.01 * n, -0.5, 0.25), (0x06, ">3f", 0.1, 0.2, 0.4), (0xD5, ">Q", 10_000_000 * n))
+    body = b"".join(bytes([2 + struct.calcsize(form), of]) + struct.pack(form, *values) for of, form, *values in fields)
+    packet = b"ue\x80" + bytes([len(body)]) + body
+    one = two = 0
+    for byte in packet:
+        one = (one + byte) % 256
+        two = (two + one) % 256
+    return packet + bytes([one, two])
+
+
+for nth, device in enumerate((ximu3, xsens, witmotion, vectornav, mip)):
+    for which, cut in ((nth, 0), (6, 7 * 9)):
+        seed("devices", f"{device.__name__}{'_auto' * (which == 6)}", bytes([which + cut]) + b"".join(map(device, range(12))))
+    seed("mcap", f"{device.__name__}_capture", b"".join(map(device, range(1, 25))))
+seed("devices", "mavlink", bytes([5]) + frames[:1000])
+
+
 def layout(of, size, name, letters, columns):
     return struct.pack("<BBBBB4s16s64s", 0xA3, 0x95, 0x80, of, size, name, letters, columns)
 

@@ -14,6 +14,7 @@ use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::decode::packed::{self, Object};
 use strapd_recording::decode::{Channel, Decoder, Options, decode_line, role};
 use strapd_recording::delimited::Table;
+use strapd_recording::devices::{Asked, Link};
 use strapd_recording::format::Format;
 use strapd_recording::lines::{HeldRow, Lines, TableStream};
 use strapd_recording::mcap::{Reader, WalkOptions, walk};
@@ -348,6 +349,50 @@ fn packed_object(object: &[u8]) {
         }
         Ok(Object::Att { .. }) => assert!(object.len() >= packed::ATT),
         Err(why) => assert!(!why.to_string().is_empty()),
+    }
+}
+
+/// Bytes of a sensor or autopilot, whose protocol the first byte chooses: lines of samples, the same however they are cut.
+pub fn devices(data: &[u8]) {
+    const NAMES: [&str; 7] = [
+        "ximu3",
+        "xsens",
+        "witmotion",
+        "vectornav",
+        "mip",
+        "mavlink",
+        "auto",
+    ];
+    let Some((first, data)) = data.split_first() else {
+        return;
+    };
+    let which = usize::from(*first) % NAMES.len();
+    let read = |size: usize| {
+        let asked = NAMES.get(which).and_then(|name| Asked::parse(name).ok());
+        let Some(mut link) = asked.and_then(Link::of) else {
+            panic!("each has a reader");
+        };
+        let mut lines = Vec::new();
+        for (n, piece) in data.chunks(size).enumerate() {
+            let now = Nanos(NOW.0 + n as i64 * 100_000_000);
+            link.push(piece, now, Some("a \"b\""), &mut lines);
+            assert!(link.notes().len() < 10);
+        }
+        lines
+    };
+    let lines = read(1 + usize::from(*first) / NAMES.len());
+    // What is no frame that can be checked is believed by what follows, and lines are what they were.
+    if which < 5 {
+        assert_eq!(lines, read(data.len().max(1)));
+    }
+    if which < 6 {
+        for line in lines.split_inclusive(|byte| *byte == b'\n') {
+            let mut samples = Vec::new();
+            match decode_line(line, NOW, &mut samples) {
+                Ok(line) => assert_eq!((samples.len(), line.bare.len()), (1, 0)),
+                Err(why) => panic!("{why}: {}", line.escape_ascii()),
+            }
+        }
     }
 }
 

@@ -186,6 +186,11 @@ fn tables_by_columns_cut_anywhere() {
 }
 
 #[test]
+fn devices() {
+    survives("devices", cases(), crate::parsers::devices);
+}
+
+#[test]
 fn conversations() {
     survives("session", cases(), crate::parsers::session);
 }

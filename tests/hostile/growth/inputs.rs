@@ -162,6 +162,12 @@ fn own_types(length: usize) -> Vec<u8> {
     })
 }
 
+/// Frames of a sensor, by which a capture of it is known.
+fn captured(device: &str) -> Vec<u8> {
+    let seeds = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/seeds/mcap");
+    std::fs::read(format!("{seeds}/{device}_capture")).unwrap()
+}
+
 /// Two heartbeats, by which captured bytes of a link are known.
 fn capture_head() -> Vec<u8> {
     let frame = |n: u8| {
@@ -497,6 +503,13 @@ pub(crate) const CASES: &[Case] = cases! {
         "tlog: messages that are not read": |n| b"\0\x06\0\0\0\0\0\0\xfe\0\0\0\0\x07\0\0".repeat(n / 16);
         "MAVLink capture: marks": |n| [capture_head(), b"\xfd\x09\0".repeat(n / 3)].concat();
         "MAVLink capture: messages that are not read": |n| [capture_head(), b"\xfe\0\0\0\0\x07\0\0".repeat(n / 8)].concat();
+        "sensor capture: marks of Xsens": |n| [captured("xsens"), b"\xfa\xff\x36\xfe".repeat(n / 4)].concat();
+        "sensor capture: marks of MIP": |n| [captured("mip"), b"ue\x80\xff".repeat(n / 4)].concat();
+        "sensor capture: marks of VectorNav": |n| [captured("vectornav"), b"\xfa\x01\xff\x0f".repeat(n / 4)].concat();
+        "sensor capture: lines of VectorNav": |n| [captured("vectornav"), b"$VN".repeat(n / 3)].concat();
+        "sensor capture: marks of WitMotion": |n| [captured("witmotion"), b"\x55\x52".repeat(n / 2)].concat();
+        "sensor capture: marks of x-IMU3": |n| [captured("ximu3"), b"\xc9".repeat(n)].concat();
+        "sensor capture: text of x-IMU3": |n| [captured("ximu3"), b"I,1".repeat(n / 3)].concat();
         "DataFlash: garbage": |n| [&b"\xa3\x95\x80"[..], &vec![0x55; n]].concat();
         "DataFlash: marks": |n| b"\xa3\x95\x80".repeat(n / 3);
         "GPMF: empty devices": |n| b"DEVC\0\x01\0\0".repeat(n / 8);
