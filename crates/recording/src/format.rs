@@ -459,7 +459,13 @@ fn tells_enough(head: &[u8]) -> bool {
         .unwrap_or_default();
     !Format::may_be_log(head)
         && (Format::of_bytes(head).is_some()
-            || (!lines.is_empty() && !delimited::may_be_table(lines)))
+            || (!lines.is_empty() && !delimited::may_be_table(lines) && !has_controls(head)))
+}
+
+/// Whether there are bytes that no text has: frames may follow, within one of which it begins.
+fn has_controls(head: &[u8]) -> bool {
+    head.iter()
+        .any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace())
 }
 
 /// Opens a file to be read from its beginning.

@@ -196,7 +196,9 @@ impl Reader {
             let have = magic.len();
             let read = from.by_ref().take(more as u64).read_to_end(&mut magic);
             read.map_err(|e| read_error(&name, 0, e))?;
-            let is_open = magic.len() > have && Format::may_be_log(&magic);
+            // Bytes of a sensor may begin within a frame, and say what they are behind that.
+            let tells_nothing = magic.len() < format::HEAD && Format::of_log(&magic).is_none();
+            let is_open = magic.len() > have && (tells_nothing || Format::may_be_log(&magic));
             more = match LONGEST_MAGIC.checked_sub(magic.len()) {
                 _ if !is_open => 0,
                 None | Some(0) => SHOWN_MORE,

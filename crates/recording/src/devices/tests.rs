@@ -373,6 +373,8 @@ fn a_capture_is_a_recording_of_the_same_samples_with_its_damage_named() {
             let dir = tempfile::tempdir().unwrap();
             let path = dir.path().join("capture.bin");
             std::fs::write(&path, &bytes).unwrap();
+            let stream = Log::from_stream("c", Box::new(std::io::Cursor::new(bytes.clone())));
+            assert_eq!(stream.unwrap().format(), Format::Device, "{name}");
             let survey = survey(&Log::open(&path).unwrap(), &WalkOptions::default()).unwrap();
             let messages = survey.messages;
             assert_eq!(survey.facts.format, Format::Device);
@@ -391,6 +393,20 @@ fn a_capture_is_a_recording_of_the_same_samples_with_its_damage_named() {
                 survey.problems
             );
         }
+    }
+}
+
+#[test]
+fn a_capture_from_a_pipe_may_begin_within_a_frame() {
+    for (name, bytes) in devices() {
+        // Line ends stand in the middle of frames.
+        let bytes = [b"\x0a\x00\x0a", &bytes[5..]].concat();
+        let head = crate::format::head_of(&mut std::io::BufReader::with_capacity(16, &bytes[..]));
+        assert_eq!(
+            Format::of_bytes(&head.unwrap()),
+            Some(Format::Device),
+            "{name}"
+        );
     }
 }
 
