@@ -71,7 +71,7 @@ pub const PROTOCOLS: &[Protocol] = &[
         title: "x-IMU3",
         carries: "inertial and magnetometer messages, binary and ASCII, also through a multiplexer",
         cut: ximu3::cut,
-        opens: Opens::Device(|| Box::new(ximu3::Ximu3::default())),
+        opens: Opens::Device(|| Box::new(ximu3::Ximu3)),
     },
     Protocol {
         name: "xsens",

@@ -104,7 +104,7 @@ fn numbers_of_an_mti_come_in_four_forms_and_from_what_it_was_told_to_send() {
         None,
         None,
     );
-    assert!((read("xsens", &pi).0[0].rate.unwrap()[0] - 3.1415).abs() < 1e-4);
+    assert!((read("xsens", &pi).0[0].rate.unwrap()[0] - std::f64::consts::PI).abs() < 1e-4);
     // A world other than east, north, up is left out; clipped axes are counted.
     let q = made::numbers(0, &[1.0, 0.0, 0.0, 0.0]);
     let of = |id, word: u32| {
@@ -295,7 +295,7 @@ fn packets_of_mip_are_read_by_any_of_their_clocks() {
     // Angles before rates; answers and other sets are no samples.
     let angle = made::mip(0x80, &[rate.clone(), (0x07, f([1e-3, 0.0, 0.0]))]);
     let bytes = [
-        made::mip(0x82, &[rate.clone()]),
+        made::mip(0x82, std::slice::from_ref(&rate)),
         angle,
         made::mip(0x80, &[rate]),
     ]

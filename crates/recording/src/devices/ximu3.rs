@@ -122,7 +122,7 @@ fn unstuffed(body: &[u8]) -> Option<Vec<u8>> {
 }
 
 /// A sensor, or several behind a multiplexer.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Ximu3;
 
 impl Device for Ximu3 {
