@@ -89,7 +89,7 @@ impl Auto {
         (self.text.has_object || self.text.lines >= least).then_some(Found::Lines)
     }
 
-    /// What is held where nothing more comes, if it may be lines of text.
+    /// Gives back the bytes that are held, where nothing more comes and they may be lines of text.
     pub(super) fn rest(&mut self) -> Vec<u8> {
         let mut held = std::mem::take(&mut self.held);
         if self.text.lines == 0 && !held.iter().all(is_text) {

@@ -1,4 +1,6 @@
-//! What frames of several protocols have in common. Pure.
+//! Sums and marks -> whether a frame is whole. Pure.
+//!
+//! Apart from the protocols because several of them have these in common.
 
 pub(super) use crate::records::cut::Cut;
 

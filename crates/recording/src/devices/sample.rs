@@ -1,4 +1,4 @@
-//! What a frame holds -> a line of a daemon, or messages of a recording. Pure.
+//! Numbers of a frame -> a line of a daemon, or messages of a recording. Pure.
 //!
 //! Apart from the protocols so that none of them knows how a sample is told.
 

@@ -14,7 +14,7 @@ pub(crate) enum Cut {
     },
     /// Beginning of a frame; so many bytes are needed to say more.
     Need(usize),
-    /// No frame.
+    /// Bytes that begin no frame.
     No,
 }
 
