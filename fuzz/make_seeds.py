@@ -239,7 +239,7 @@ def vectornav(n):
 def mip(n):
     fields = ((0x04, ">3f", 0, 0, -1), (0x05, ">3f", 0.01 * n, -0.5, 0.25), (0x06, ">3f", 0.1, 0.2, 0.4), (0xD5, ">Q", 10_000_000 * n))
     body = b"".join(bytes([2 + struct.calcsize(form), of]) + struct.pack(form, *values) for of, form, *values in fields)
-    packet = b"ue\x80" + bytes([len(body)]) + body
+    packet = b"\x75\x65\x80" + bytes([len(body)]) + body
     one = two = 0
     for byte in packet:
         one = (one + byte) % 256

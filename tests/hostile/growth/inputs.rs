@@ -504,7 +504,7 @@ pub(crate) const CASES: &[Case] = cases! {
         "MAVLink capture: marks": |n| [capture_head(), b"\xfd\x09\0".repeat(n / 3)].concat();
         "MAVLink capture: messages that are not read": |n| [capture_head(), b"\xfe\0\0\0\0\x07\0\0".repeat(n / 8)].concat();
         "sensor capture: marks of Xsens": |n| [captured("xsens"), b"\xfa\xff\x36\xfe".repeat(n / 4)].concat();
-        "sensor capture: marks of MIP": |n| [captured("mip"), b"ue\x80\xff".repeat(n / 4)].concat();
+        "sensor capture: marks of MIP": |n| [captured("mip"), b"\x75\x65\x80\xff".repeat(n / 4)].concat();
         "sensor capture: marks of VectorNav": |n| [captured("vectornav"), b"\xfa\x01\xff\x0f".repeat(n / 4)].concat();
         "sensor capture: lines of VectorNav": |n| [captured("vectornav"), b"$VN".repeat(n / 3)].concat();
         "sensor capture: marks of WitMotion": |n| [captured("witmotion"), b"\x55\x52".repeat(n / 2)].concat();

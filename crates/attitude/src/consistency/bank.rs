@@ -119,9 +119,9 @@ fn bank() -> Vec<Hypothesis> {
 /// Scatter of gravity in a segment, g^2.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
-    /// Under each hypothesis, with what is missing of gravity.
+    /// Scatter under each hypothesis, with what is missing of gravity.
     of: Vec<f64>,
-    /// As recorded, without that: what spins about itself has a force that is mostly no gravity.
+    /// Scatter as recorded, without that: what spins about itself has a force that is mostly no gravity.
     wanders: f64,
 }
 
