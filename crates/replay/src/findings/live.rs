@@ -42,6 +42,8 @@ const SPEED_SAMPLES: u64 = 320;
 const SPEED_MOST: u64 = 1 << 15;
 /// Difference of two stretches in a row up to which they tell of one clock. A sender that falls behind slows down.
 const SPEED_AGREES: f64 = 0.02;
+/// Addition to what a recording is told of its clock.
+const PLAYED: &str = "; a recording that is sent faster or slower than it ran looks the same";
 /// Scatter of a field, as a share of it, from which on it is worth a look at axes and iron: 0.01 of healthy sensors.
 const WANDERS: f64 = 0.03;
 /// Fields of zero after which they are no beginning of a driver.
@@ -117,7 +119,11 @@ impl SpeedWatch {
         let confirmed = speed
             .zip(self.suspected)
             .is_some_and(|(now, then)| (now / then - 1.0).abs() <= SPEED_AGREES);
-        let finding = said.map(|said| Finding::said(Severity::Warning, "clock-speed", &said));
+        let finding = said.map(|said| {
+            let mut finding = Finding::said(Severity::Warning, "clock-speed", &said);
+            finding.advice += PLAYED;
+            finding
+        });
         *self = SpeedWatch {
             found: finding.filter(|_| confirmed),
             suspected: speed,
