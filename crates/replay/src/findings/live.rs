@@ -36,7 +36,7 @@ const OFTEN: usize = 24;
 /// Speeds of a stamp clock by arrival that are judged: beyond, a recording is sent, or the unit is another.
 const SPEEDS: std::ops::Range<f64> = 0.2..5.0;
 /// Time of arrival before the first judgement of it, and between two, ns; samples for the first, and for one pass.
-const SPEED_LEAST: i64 = 10_000_000_000;
+const SPEED_LEAST: i64 = 8_000_000_000;
 const SPEED_PACE: i64 = 60_000_000_000;
 const SPEED_SAMPLES: u64 = 320;
 const SPEED_MOST: u64 = 1 << 15;
