@@ -67,10 +67,14 @@ fn a_clock_that_is_set_goes_on_and_is_said_and_one_of_another_speed_is_said() {
     );
     let what = finding(&status, "clock-speed")["what"].as_str().unwrap();
     assert!(what.contains("0.500 s"), "{what}");
-    // A sender that falls behind for a while, and goes on at its pace.
-    let behind = |n: i64| 87 * (STEP * n).min(11_000_000_000) / 1000;
-    let status = received(|n| nanos(T0 + STEP * n), |n| late(n) + behind(n));
-    assert_eq!(codes(&status, "imu0"), Vec::<String>::new(), "{status}");
+    // A sender that falls behind for a while, and goes on at its pace; one that falls behind more and more.
+    let ms = |n: i64| STEP / 1_000_000 * n;
+    let for_a_while = |n: i64| 87_000 * ms(n).min(11_000);
+    let more_and_more = |n: i64| 87_000 * ms(n) + 89_000 * (ms(n) - 9_000).max(0);
+    for behind in [&for_a_while as &dyn Fn(i64) -> i64, &more_and_more] {
+        let status = received(|n| nanos(T0 + STEP * n), |n| late(n) + behind(n));
+        assert_eq!(codes(&status, "imu0"), Vec::<String>::new(), "{status}");
+    }
     // As fast as it can be sent, and twice as fast as it was recorded at.
     let status = received(|n| nanos(T0 + STEP * n), |n| 1000 * n);
     assert_eq!(codes(&status, "imu0"), Vec::<String>::new());
