@@ -261,7 +261,7 @@ impl Consistency {
         if !segment.moves() {
             return;
         }
-        let scatter = self.identity.push(&segment).as_recorded();
+        let scatter = self.identity.push(&segment, |_| true).as_recorded();
         self.scattered.push_back(scatter > GATE_SCATTER);
         if self.scattered.len() > GATE_LAST {
             self.scattered.pop_front();
