@@ -6,14 +6,20 @@
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::Path;
+use std::thread;
+use std::time::Duration;
 use strapd_attitude::diagnostic::Diagnostic;
+
+/// Time between two tries, and how many there are before the last.
+const MOMENT: Duration = Duration::from_millis(10);
+const TRIES: u32 = 3;
 
 /// Locks an open file, for as long as it stays open.
 ///
 /// # Errors
 /// [`ErrorKind::ResourceBusy`]: another process has it ([`is_busy`]); any other: the file system has no locks.
 pub(super) fn claim(file: &File) -> io::Result<()> {
-    told(file, file.try_lock())
+    patiently(file, File::try_lock)
 }
 
 /// Locks a file that a daemon writes. A file system without locks is no reason to refuse: it is reported.
@@ -46,7 +52,7 @@ pub fn unclaimed(path: &Path) -> io::Result<Option<File>> {
     let Ok(file) = File::open(path) else {
         return Ok(None);
     };
-    match told(&file, file.try_lock_shared()) {
+    match patiently(&file, File::try_lock_shared) {
         Err(e) if is_busy(&e) => Err(e),
         _ => Ok(Some(file)),
     }
@@ -55,6 +61,18 @@ pub fn unclaimed(path: &Path) -> io::Result<Option<File>> {
 /// Whether another process has the file.
 pub(super) fn is_busy(error: &io::Error) -> bool {
     error.kind() == ErrorKind::ResourceBusy
+}
+
+/// Locks a file, a moment later where it is locked: a process that another thread has just begun holds what this one has
+/// closed, until it runs its own program.
+fn patiently(file: &File, lock: fn(&File) -> Result<(), TryLockError>) -> io::Result<()> {
+    for _ in 0..TRIES {
+        match lock(file) {
+            Err(TryLockError::WouldBlock) => thread::sleep(MOMENT),
+            other => return told(file, other),
+        }
+    }
+    told(file, lock(file))
 }
 
 fn told(file: &File, locked: Result<(), TryLockError>) -> io::Result<()> {
@@ -127,5 +145,21 @@ mod tests {
         assert!(kept.is_some() && claim(&File::open(&path)?).is_err());
         drop(kept);
         claim(&File::open(&path)?)
+    }
+
+    #[test]
+    fn a_lock_that_goes_in_a_moment_is_waited_for() -> io::Result<()> {
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("a");
+        let first = File::create(&path)?;
+        claim(&first)?;
+        let second = File::open(&path)?;
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                thread::sleep(MOMENT / 2);
+                drop(first);
+            });
+            claim(&second)
+        })
     }
 }
