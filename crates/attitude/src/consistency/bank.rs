@@ -236,7 +236,7 @@ impl Evidence {
 
     /// Takes a segment.
     pub(super) fn push(&mut self, segment: &Segment) {
-        let (sums, is_whole) = (&self.sums, self.residuals.count % SELDOM == 0);
+        let (sums, is_whole) = (&self.sums, self.residuals.count.is_multiple_of(SELDOM));
         let judged = |h: usize| is_whole || sums[h] > HOPELESS;
         let row = self.residuals.push(segment, judged);
         for (h, sum) in self.sums.iter_mut().enumerate() {
