@@ -18,7 +18,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::devices::{self, Asked};
-use strapd_recording::format::Format;
+use strapd_recording::format::{Format, HEAD};
 use tempfile::TempDir;
 use tokio::time::{Instant, timeout_at};
 
@@ -198,7 +198,7 @@ fn kept_of(place: &SerialPlace, bytes: Vec<u8>, protocol: Asked) -> Result<Vec<u
     for note in &notes {
         tracing::info!("{place}: {}", note.text);
     }
-    let (has_frames, head) = (link.has_frames(), bytes.get(..CAPTURE_HEAD));
+    let (has_frames, head) = (link.has_frames(), bytes.get(..HEAD));
     if has_frames && link.counts().0 > 0 {
         let is_capture = Format::of_bytes(head.unwrap_or(&bytes)) == Some(Format::Device);
         return Ok(if is_capture { bytes } else { lines });
@@ -223,8 +223,6 @@ fn addressed(place: &SerialPlace, protocol: Asked) -> String {
     }
 }
 
-/// Bytes by which a capture is recognised.
-const CAPTURE_HEAD: usize = 4096;
 /// Time after which a protocol must have shown itself, ns.
 const LATE: i64 = 10_000_000_000;
 

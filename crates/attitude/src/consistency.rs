@@ -21,6 +21,7 @@ mod segment;
 #[cfg(test)]
 mod tests;
 
+pub use self::bank::CHIPS;
 use self::bank::{Answer, BANK, Evidence, Verdict};
 use self::blocks::{Block, Blocks, Rest, Step};
 pub use self::field::{FieldConsistency, FieldDisagreement, FieldIron, FieldReading};

@@ -15,6 +15,7 @@ mod clock;
 mod frame;
 mod link;
 mod mip;
+mod motion;
 mod numbers;
 mod reader;
 mod recognise;

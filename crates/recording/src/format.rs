@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::records::MAGIC;
-pub(crate) use crate::records::transcript::HEAD;
+pub use crate::records::transcript::HEAD;
 use crate::records::transcript::Transcribe;
 use crate::text::without_mark;
 use crate::{bag, dataflash, delimited, devices, gpmf, mavlink, parquet, recognise, sqlite, ulog};

@@ -14,26 +14,23 @@ pub(super) const MAPS: usize = 48;
 /// Factors are powers of this, of these exponents without 0.
 const RATIO: f64 = 1.25;
 const EXPONENTS: std::ops::RangeInclusive<i32> = -41..=10;
-/// Factors that units, ranges and counts of chips make: a hand turns ten rad in a segment, of which the 12 % between two
-/// powers leave nothing that stands still.
-const UNITS: [f64; 13] = [
-    DEGREE,
-    1.0 / DEGREE,
-    1e-3,
-    0.5,
-    2.0,
-    DEGREE / 16.4,
-    DEGREE / 32.8,
-    DEGREE / 65.5,
-    DEGREE / 131.0,
-    DEGREE * 70e-3,
-    DEGREE * 35e-3,
-    DEGREE * 17.5e-3,
-    DEGREE * 8.75e-3,
+/// Counts per deg/s, and ranges in deg/s, of common sensors: InvenSense and Bosch, then ST by its mdps per count.
+pub const CHIPS: [(f64, u32); 8] = [
+    (16.4, 2000),
+    (32.8, 1000),
+    (65.5, 500),
+    (131.0, 250),
+    (1000.0 / 70.0, 2000),
+    (1000.0 / 35.0, 1000),
+    (1000.0 / 17.5, 500),
+    (1000.0 / 8.75, 250),
 ];
+/// Factors that units and ranges make, beside the counts of chips: a hand turns ten rad in a segment, of which the 12 %
+/// between two powers leave nothing that stands still.
+const UNITS: [f64; 5] = [DEGREE, 1.0 / DEGREE, 1e-3, 0.5, 2.0];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Hypotheses in the bank.
-const HYPOTHESES: usize = MAPS + 51 + UNITS.len();
+const HYPOTHESES: usize = MAPS + 51 + UNITS.len() + CHIPS.len();
 /// Least mean force of what stands still, g: rates of any other size turn gravity until nothing of it is left, and
 /// nothing does not wander.
 const LEAST_GRAVITY: f64 = 0.5;
@@ -112,7 +109,8 @@ fn bank() -> Vec<Hypothesis> {
     }
     maps.sort_by(|some, other| some.cost.total_cmp(&other.cost));
     let powers = EXPONENTS.filter(|k| *k != 0).map(|k| RATIO.powi(k));
-    maps.extend(powers.chain(UNITS).map(|factor| Hypothesis {
+    let chips = CHIPS.map(|(counts, _)| DEGREE / counts);
+    maps.extend(powers.chain(UNITS).chain(chips).map(|factor| Hypothesis {
         map: Matrix3::from_diagonal_element(factor),
         factor: Some(factor),
         cost: 1.5 + 0.5 * factor.ln().abs(),
@@ -169,7 +167,7 @@ impl Residuals {
             .zip(BANK.iter())
             .enumerate()
             .map(|(h, ((normal, slope), hypothesis))| {
-                if h > 0 && !judged(h) {
+                if !judged(h) {
                     return as_recorded;
                 }
                 let found = segment.scatter::<3>(&hypothesis.map, &[], &Vector3::zeros());

@@ -4,8 +4,8 @@
 //! are forward, right, down.
 
 use super::layout::Layout;
-use crate::records::cdr::{Cdr, put};
-use crate::records::imu;
+use crate::records::cdr::{put, stamped};
+use crate::records::imu::{self, flu};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 
 /// Tesla of a milligauss.
@@ -40,7 +40,7 @@ impl Content {
     pub(super) fn schema(self) -> (u16, &'static str) {
         match self {
             Content::Imu => (1, imu::TYPE),
-            Content::Field => (2, "sensor_msgs/msg/MagneticField"),
+            Content::Field => (2, imu::FIELD_TYPE),
             Content::Attitude => (3, "geometry_msgs/msg/QuaternionStamped"),
         }
     }
@@ -74,23 +74,16 @@ impl Content {
             }
             Content::Field => {
                 let field = flu(layout.vector(message, ["MagX", "MagY", "MagZ"])?);
-                // Of its covariance nothing is known: zeros.
-                let numbers = stamped(out, time, 3 + 9);
-                put(out.get_mut(numbers..)?, 0, field.map(|c| c * MILLIGAUSS));
+                imu::field(out, (time, FRAME), field.map(|c| c * MILLIGAUSS));
             }
             Content::Attitude => {
                 let angles = layout.vector(message, ["Roll", "Pitch", "Yaw"])?;
-                let numbers = stamped(out, time, 4);
+                let numbers = stamped(out, (time, FRAME), 4);
                 put(out.get_mut(numbers..)?, 0, attitude(angles));
             }
         }
         Some(())
     }
-}
-
-/// Forward, right, down as forward, left, up.
-fn flu([x, y, z]: [f64; 3]) -> [f64; 3] {
-    [x, -y, -z]
 }
 
 /// `[x, y, z, w]`, FLU body to a world with x north, y west, z up, of angles in degrees, FRD body to NED.
@@ -99,22 +92,6 @@ fn attitude(angles: [f64; 3]) -> [f64; 4] {
     let q = Quaternion::<(), ()>::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
     let [w, x, y, z] = q.wxyz();
     [x, -y, -z, w]
-}
-
-/// Begins a message with a header in place of what is in `out`; returns the place of its numbers, which are zeros.
-fn stamped(out: &mut Vec<u8>, time: u64, count: usize) -> usize {
-    let mut cdr = Cdr::within(std::mem::take(out));
-    let stamp = cdr.stamp();
-    cdr.string(FRAME);
-    let numbers = cdr.numbers(count);
-    *out = cdr.into_bytes();
-    let secs = i32::try_from(time / 1_000_000_000).unwrap_or(i32::MAX);
-    let nanos = (time % 1_000_000_000) as u32;
-    if let Some(place) = out.get_mut(stamp..stamp + 8) {
-        let both = [secs.to_le_bytes(), nanos.to_le_bytes()].concat();
-        place.copy_from_slice(&both);
-    }
-    numbers
 }
 
 #[cfg(test)]

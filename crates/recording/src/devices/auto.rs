@@ -12,8 +12,8 @@ use strapd_attitude::record::Nanos;
 const MOST: usize = 64 << 10;
 /// Bytes that are kept of more: longer than some frames of each protocol.
 const KEPT: usize = 16 << 10;
-/// Time in which a device shows what it is, ns.
-const PATIENCE: i64 = 2_000_000_000;
+/// Time in which a device shows what it is, and frames come, ns.
+pub(super) const PATIENCE: i64 = 2_000_000_000;
 /// Lines of numbers by which lines are known, where they are no objects: more than frames, which may be lines, too.
 const LINES: usize = 5;
 /// Numbers of such a line. A device that starts prints text, and few of them.

@@ -3,15 +3,13 @@
 //! Apart from the readers because here a link becomes what everything behind it knows already: names, lines, and words
 //! about what is lost.
 
-use super::auto::{Auto, Found};
+use super::auto::{Auto, Found, PATIENCE};
 use super::reader::Reader;
 use super::sample::name;
-use super::{Asked, Protocol};
+use super::{Asked, Opens, Protocol};
 use crate::mavlink;
+use crate::records::problem::ProblemKind;
 use strapd_attitude::record::Nanos;
-
-/// Time in which frames come, ns.
-const PATIENCE: i64 = 2_000_000_000;
 
 /// Link of a protocol that is asked for.
 #[derive(Debug)]
@@ -58,7 +56,7 @@ struct Told {
 enum State {
     /// Lines, which are passed on as they are.
     Lines,
-    Mavlink(mavlink::Link),
+    Mavlink(&'static Protocol, mavlink::Link),
     Device(&'static Protocol, Box<Reader>),
     Auto(Box<Auto>),
     /// A protocol of which nothing can be used.
@@ -131,8 +129,7 @@ impl Link {
     fn report(&mut self, is_late: bool) {
         let (frames, missing) = self.counts();
         let named = match &self.state {
-            State::Device(protocol, _) => Some(protocol.title),
-            State::Mavlink(_) => Some("MAVLink"),
+            State::Device(protocol, _) | State::Mavlink(protocol, _) => Some(protocol.title),
             State::Lines | State::Auto(_) | State::Useless => None,
         };
         if let Some(title) = named.filter(|_| is_late && frames == 0)
@@ -157,9 +154,7 @@ impl Link {
         let (skipped, clipped) = (reader.skipped, reader.taken.clipped);
         if clipped > self.told.clipped {
             self.told.clipped = clipped;
-            let text = format!(
-                "the device reports {clipped} samples with an axis at the end of its range"
-            );
+            let text = ProblemKind::Clipped { count: clipped }.to_string();
             self.notes.push(Note::warning("clipped", text));
         }
         if skipped > self.told.skipped {
@@ -186,7 +181,7 @@ impl Link {
     /// Whether its lines are those of samples in frames, and not lines that came.
     #[must_use]
     pub fn has_frames(&self) -> bool {
-        matches!(self.state, State::Mavlink(_) | State::Device(..))
+        matches!(self.state, State::Mavlink(..) | State::Device(..))
     }
 
     /// Whether its samples may have no stamp, since a device has no clock.
@@ -199,7 +194,7 @@ impl Link {
     #[must_use]
     pub fn counts(&self) -> (u64, u64) {
         match &self.state {
-            State::Mavlink(link) => link.counts(),
+            State::Mavlink(_, link) => link.counts(),
             State::Device(_, reader) => (reader.frames, reader.taken.missing),
             State::Lines | State::Auto(_) | State::Useless => (0, 0),
         }
@@ -208,17 +203,17 @@ impl Link {
 
 impl State {
     fn of(protocol: &'static Protocol) -> State {
-        match Reader::of(protocol) {
-            Some(reader) => State::Device(protocol, Box::new(reader)),
-            None if protocol.refusal().is_some() => State::Useless,
-            None => State::Mavlink(mavlink::Link::default()),
+        match protocol.opens {
+            Opens::Device(open) => State::Device(protocol, Box::new(Reader::of(protocol, open()))),
+            Opens::Mavlink => State::Mavlink(protocol, mavlink::Link::default()),
+            Opens::Nothing(_) => State::Useless,
         }
     }
 
     fn push(&mut self, bytes: &[u8], prefix: Option<&str>, lines: &mut Vec<u8>) {
         match self {
             State::Lines => lines.extend_from_slice(bytes),
-            State::Mavlink(link) => link.push(bytes, prefix, lines),
+            State::Mavlink(_, link) => link.push(bytes, prefix, lines),
             State::Device(protocol, reader) => {
                 reader.push(bytes);
                 for sample in reader.taken.samples.drain(..) {

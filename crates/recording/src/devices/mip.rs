@@ -10,8 +10,10 @@
 use super::Device;
 use super::clock::{Counter, mean_force};
 use super::frame::{Cut, may_begin};
-use super::numbers::{G, array, f32_be, flu, scaled};
+use super::motion::Choice;
+use super::numbers::{G, array, f32_be, scaled};
 use super::sample::{Sample, Taken};
+use crate::records::imu::flu;
 use strapd_attitude::record::SampleKind;
 
 const MARK: [u8; 2] = [0x75, 0x65];
@@ -64,7 +66,7 @@ fn fletcher(bytes: &[u8]) -> [u8; 2] {
 #[derive(Debug)]
 pub(super) struct Mip {
     ticks: Counter,
-    has_angles: Option<bool>,
+    motion: Choice,
     /// Time of the sample before.
     before: Option<u64>,
 }
@@ -73,7 +75,7 @@ impl Default for Mip {
     fn default() -> Mip {
         Mip {
             ticks: Counter::of(32),
-            has_angles: None,
+            motion: Choice::default(),
             before: None,
         }
     }
@@ -140,25 +142,22 @@ impl Mip {
     }
 
     fn tell(&mut self, packet: &Packet, to: &mut Taken) {
-        if packet.angle.is_some() || packet.rate.is_some() {
-            self.has_angles.get_or_insert(packet.angle.is_some());
-        }
-        let (rate, kind) = match self.has_angles {
-            Some(true) => (packet.angle, Some(SampleKind::DeltaAngle)),
-            _ => (packet.rate, None),
-        };
+        let motion = self.motion.of(&[
+            (Some(SampleKind::DeltaAngle), packet.angle),
+            (None, packet.rate),
+        ]);
         let time = packet.reference.or(packet.gps).or(packet.internal);
         let mean = |velocity| mean_force(velocity, self.before, time);
         let force = packet.force.or_else(|| packet.velocity.and_then(mean));
         to.add(Sample {
             time,
-            kind: kind.filter(|_| rate.is_some()),
-            rate: rate.map(flu),
+            kind: motion.and_then(|(_, kind)| kind),
+            rate: motion.map(|(rate, _)| flu(rate)),
             force: force.map(|force| flu(scaled(force, G))),
             field: packet.field.map(flu),
             ..Sample::default()
         });
-        if rate.is_some() {
+        if motion.is_some() {
             self.before = time;
         }
     }

@@ -40,11 +40,6 @@ pub(super) fn i16_le(bytes: &[u8], at: usize) -> Option<[f64; 3]> {
 /// Standard gravity, m/s^2, of which makers' g are.
 pub(super) const G: f64 = 9.806_65;
 
-/// Forward, right, down as forward, left, up.
-pub(super) fn flu([x, y, z]: [f64; 3]) -> [f64; 3] {
-    [x, -y, -z]
-}
-
 /// Vector in another unit.
 pub(super) fn scaled(vector: [f64; 3], unit: f64) -> [f64; 3] {
     vector.map(|value| value * unit)

@@ -22,16 +22,16 @@ pub(super) struct Reader {
 }
 
 impl Reader {
-    /// Reader of a protocol; `None` of one that has other readers.
-    pub(super) fn of(protocol: &'static Protocol) -> Option<Reader> {
-        Some(Reader {
+    /// Reader of a protocol's bytes for a device of it.
+    pub(super) fn of(protocol: &'static Protocol, device: Box<dyn Device>) -> Reader {
+        Reader {
             protocol,
-            device: protocol.device()?,
+            device,
             partial: Vec::new(),
             frames: 0,
             skipped: 0,
             taken: Taken::default(),
-        })
+        }
     }
 
     /// Takes the next bytes; their samples are in [`Reader::taken`].

@@ -2,9 +2,8 @@
 //!
 //! Apart from the protocols so that none of them knows how a sample is told.
 
-use crate::records::cdr::{Cdr, put};
+use crate::records::cdr::put;
 use crate::records::imu;
-use std::fmt::Write;
 use strapd_attitude::record::SampleKind;
 
 /// A sample in SI; x forward, y left, z up.
@@ -59,57 +58,33 @@ pub(super) fn name(of: &str, unit: Option<u8>) -> String {
 }
 
 impl Sample {
-    /// Appends the line that a daemon reads. Floats are the shortest decimals that read back to the same bits.
+    /// Appends the line that a daemon reads.
     pub(super) fn line(&self, id: &str, to: &mut Vec<u8>) {
-        let mut line = format!("{{\"id\":{}", serde_json::Value::String(id.to_owned()));
-        // A String takes every write.
-        if let Some(time) = self.time {
-            let (sec, nsec) = (time / 1_000_000_000, time % 1_000_000_000);
-            let _ = write!(line, ",\"stamp\":{{\"sec\":{sec},\"nsec\":{nsec}}}");
-        }
         let vectors = [
             ("gyro", self.rate),
             ("accel", self.force),
             ("mag", self.field),
         ];
-        for (name, vector) in vectors {
-            if let Some([x, y, z]) = vector {
-                let _ = write!(line, ",\"{name}\":[{x},{y},{z}]");
-            }
-        }
-        if let Some(kind) = self.kind {
-            let _ = write!(line, ",\"sample_kind\":\"{}\"", kind.name());
-        }
-        line.push_str("}\n");
-        to.extend_from_slice(line.as_bytes());
+        imu::line(to, (id, self.time), &vectors, self.kind);
     }
 
     /// Writes the rate with what belongs to it in place of what is in `out`, as ROS's `Imu`.
     pub(super) fn imu(&self, rate: [f64; 3], out: &mut Vec<u8>) {
-        imu::imu(out, (self.time.unwrap_or(0), FRAME), rate, self.force);
+        let place = imu::imu(out, self.header(), rate, self.force);
         if let Some([w, x, y, z]) = self.orientation {
-            let (_, _, numbers) = imu::empty(Cdr::default(), FRAME);
-            let numbers = out.get_mut(numbers..).unwrap_or_default();
+            // Behind it the first number of its covariance, which is no longer absent.
+            let numbers = out.get_mut(place..).unwrap_or_default();
             put(numbers, imu::ORIENTATION, [x, y, z, w, 0.0]);
         }
     }
 
     /// Writes the field in place of what is in `out`, as ROS's `MagneticField`.
     pub(super) fn magnetic(&self, field: [f64; 3], out: &mut Vec<u8>) {
-        let mut cdr = Cdr::within(std::mem::take(out));
-        let stamp = cdr.stamp();
-        cdr.string(FRAME);
-        // Of its covariance nothing is known: zeros.
-        let numbers = cdr.numbers(3 + 9);
-        *out = cdr.into_bytes();
-        let time = self.time.unwrap_or(0);
-        let secs = i32::try_from(time / 1_000_000_000).unwrap_or(i32::MAX);
-        let nanos = (time % 1_000_000_000) as u32;
-        let both = [secs.to_le_bytes(), nanos.to_le_bytes()].concat();
-        if let Some(place) = out.get_mut(stamp..stamp + 8) {
-            place.copy_from_slice(&both);
-        }
-        put(out.get_mut(numbers..).unwrap_or_default(), 0, field);
+        imu::field(out, self.header(), field);
+    }
+
+    fn header(&self) -> (u64, &'static str) {
+        (self.time.unwrap_or(0), FRAME)
     }
 }
 

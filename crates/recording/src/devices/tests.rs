@@ -19,7 +19,7 @@ fn named(name: &str) -> &'static Protocol {
 }
 
 fn read(name: &str, bytes: &[u8]) -> (Vec<Sample>, Reader) {
-    let mut reader = Reader::of(named(name)).unwrap();
+    let mut reader = Reader::of(named(name), named(name).device().unwrap());
     reader.push(bytes);
     (std::mem::take(&mut reader.taken.samples), reader)
 }
@@ -315,7 +315,7 @@ fn bytes_cut_anywhere_give_the_same_samples_behind_a_boot_text_and_half_a_frame(
         let text = b"ets Jun  8 2016 00:22:57\r\nboot: ok\r\n";
         let noisy = [text, &bytes[3..], &bytes].concat();
         for size in [1, 2, 3, 7, 31, 256, 4096] {
-            let mut reader = Reader::of(named(name)).unwrap();
+            let mut reader = Reader::of(named(name), named(name).device().unwrap());
             noisy.chunks(size).for_each(|part| reader.push(part));
             let rest = &reader.taken.samples[reader.taken.samples.len() - all.len()..];
             assert_eq!(rest.len(), all.len());

@@ -16,9 +16,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::setting::SAMPLE_KIND;
 
-/// Type of the messages of a field.
-const FIELD: &str = "sensor_msgs/msg/MagneticField";
-
 /// Channel: device on the link, content.
 type Key = (Option<u8>, Content);
 
@@ -162,7 +159,7 @@ impl Transcriber {
         let (unit, content) = key;
         let (schema, of) = match content {
             Content::Rates(_) => (1, imu::TYPE),
-            Content::Field => (2, FIELD),
+            Content::Field => (2, imu::FIELD_TYPE),
         };
         if self.schemas.insert(schema) {
             let text = known_definition(of).unwrap_or_default();

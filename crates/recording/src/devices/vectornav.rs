@@ -12,8 +12,10 @@
 use super::Device;
 use super::clock::mean_force;
 use super::frame::{Cut, may_begin};
-use super::numbers::{array, f32_le, flu, scaled};
+use super::motion::Choice;
+use super::numbers::{array, f32_le, scaled};
 use super::sample::{Sample, Taken};
+use crate::records::imu::flu;
 use strapd_attitude::record::SampleKind;
 
 /// Mark of a binary message.
@@ -119,18 +121,10 @@ fn cut_text(bytes: &[u8]) -> Cut {
     Cut::checked(holds, end + 1)
 }
 
-/// Quantity that is taken for the motion.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Motion {
-    DeltaTheta,
-    Rate,
-    RawRate,
-}
-
 /// A sensor.
 #[derive(Debug, Default)]
 pub(super) struct VectorNav {
-    motion: Option<Motion>,
+    motion: Choice,
     /// Time of the sample before.
     before: Option<u64>,
 }
@@ -167,29 +161,23 @@ impl Device for VectorNav {
 
 impl VectorNav {
     fn tell(&mut self, message: &Message, to: &mut Taken) {
-        let there = [
-            (Motion::DeltaTheta, message.delta_theta),
-            (Motion::Rate, message.rate),
-            (Motion::RawRate, message.raw_rate),
-        ];
-        let first = there.iter().find(|(_, rate)| rate.is_some());
-        let motion = self.motion.or(first.map(|(motion, _)| *motion));
-        self.motion = motion;
-        let taken = there.into_iter().find(|(of, _)| Some(*of) == motion);
-        let rate = taken.and_then(|(_, rate)| rate);
+        let motion = self.motion.of(&[
+            (Some(SampleKind::Rotation), message.delta_theta),
+            (None, message.rate),
+            (None, message.raw_rate),
+        ]);
         let time = message.time.or(message.gps_time);
         let mean = |velocity| mean_force(velocity, self.before, time);
         let force = message.force.or(message.raw_force);
-        let increments = rate.is_some() && motion == Some(Motion::DeltaTheta);
         to.add(Sample {
             time,
-            kind: increments.then_some(SampleKind::Rotation),
-            rate: rate.map(flu),
+            kind: motion.and_then(|(_, kind)| kind),
+            rate: motion.map(|(rate, _)| flu(rate)),
             force: force.or_else(|| message.velocity.and_then(mean)).map(flu),
             field: message.field.or(message.raw_field).map(flu),
             ..Sample::default()
         });
-        if rate.is_some() {
+        if motion.is_some() {
             self.before = time;
         }
     }

@@ -11,8 +11,10 @@
 use super::Device;
 use super::clock::{Counter, Packets, mean_force};
 use super::frame::{Cut, LONGEST, may_begin, sum};
+use super::motion::Choice;
 use super::numbers::array;
 use super::sample::{Sample, Taken};
+use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::SampleKind;
 
 /// Preamble, bus and message.
@@ -47,20 +49,12 @@ pub(super) fn cut(bytes: &[u8]) -> Cut {
     }
 }
 
-/// Quantity that is taken for the motion.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Motion {
-    DeltaQ,
-    Rate,
-    RateHr,
-}
-
 /// A sensor.
 #[derive(Debug)]
 pub(super) struct Xsens {
     packets: Packets,
     clock: Counter,
-    motion: Option<Motion>,
+    motion: Choice,
     /// Time of the sample before, and whether nothing is missing since.
     before: Option<u64>,
 }
@@ -70,7 +64,7 @@ impl Default for Xsens {
         Xsens {
             packets: Packets::default(),
             clock: Counter::of(32),
-            motion: None,
+            motion: Choice::default(),
             before: None,
         }
     }
@@ -148,26 +142,22 @@ impl Xsens {
     }
 
     fn tell(&mut self, packet: &Packet, to: &mut Taken) {
-        let there = [
-            (Motion::DeltaQ, packet.delta_q.and_then(rotation_vector)),
-            (Motion::Rate, packet.rate),
-            (Motion::RateHr, packet.rate_hr),
-        ];
-        let first = there.iter().find(|(_, motion)| motion.is_some());
-        let motion = *match (&mut self.motion, first) {
-            (Some(motion), _) => motion,
-            (none, Some((motion, _))) => none.insert(*motion),
-            (None, None) => return self.tell_field(packet, to),
-        };
-        let taken = there.into_iter().find(|(of, _)| *of == motion);
-        let Some((_, Some(rate))) = taken else {
+        let motion = self.motion.of(&[
+            (
+                Some(SampleKind::Rotation),
+                packet.delta_q.and_then(rotation_vector),
+            ),
+            (None, packet.rate),
+            (None, packet.rate_hr),
+        ]);
+        let Some((rate, kind)) = motion else {
             return self.tell_field(packet, to);
         };
         let mean = |velocity| mean_force(velocity, self.before, packet.time);
         to.add(Sample {
             unit: None,
             time: packet.time,
-            kind: (motion == Motion::DeltaQ).then_some(SampleKind::Rotation),
+            kind,
             rate: Some(rate),
             force: packet.force.or_else(|| packet.velocity.and_then(mean)),
             field: packet.field,
@@ -212,17 +202,9 @@ fn numbers<const N: usize>(data: &[u8], form: u16) -> Option<[f64; N]> {
 }
 
 /// Rotation vector of a quaternion `[w, x, y, z]`; `None` of one that is no rotation.
-fn rotation_vector([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
-    let norm = (w * w + x * x + y * y + z * z).sqrt();
-    if !(0.9..1.1).contains(&norm) {
-        return None;
-    }
-    // Both signs are one rotation: the shorter way is taken.
-    let sign = if w < 0.0 { -1.0 } else { 1.0 };
-    let sine = (x * x + y * y + z * z).sqrt();
-    let factor = match sine > 0.0 {
-        true => 2.0 * sine.atan2(w.abs()) / sine,
-        false => 2.0,
-    };
-    Some([x, y, z].map(|v| v * sign * factor))
+fn rotation_vector(wxyz: [f64; 4]) -> Option<[f64; 3]> {
+    let norm = wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let turn = Quaternion::<(), ()>::try_from_wxyz(wxyz).ok()?;
+    let is_unit = (0.9..1.1).contains(&norm);
+    is_unit.then(|| turn.rotation_vector().0.into())
 }

@@ -6,7 +6,7 @@
 use super::frame::{Checked, Frame, begins, frame};
 use super::message;
 use super::sequence::{Sequences, topic};
-use std::fmt::Write;
+use crate::records::imu;
 
 /// Reader of a link.
 #[derive(Debug, Default)]
@@ -72,20 +72,11 @@ impl Link {
         if let Some(prefix) = prefix {
             id = format!("{prefix}/{id}");
         }
-        let [x, y, z] = sample.rate;
-        let [a, b, c] = sample.force;
-        if [x, y, z, a, b, c].iter().any(|value| !value.is_finite()) {
+        let (rate, force) = (sample.rate, sample.force);
+        if rate.iter().chain(&force).any(|value| !value.is_finite()) {
             return;
         }
-        let mut line = String::new();
-        // A String takes every write. Floats are the shortest decimals that read back to the same bits.
-        let _ = writeln!(
-            line,
-            "{{\"id\":{},\"stamp\":{{\"sec\":{},\"nsec\":{}}},\"gyro\":[{x},{y},{z}],\"accel\":[{a},{b},{c}]}}",
-            serde_json::Value::String(id),
-            sample.time / 1_000_000_000,
-            sample.time % 1_000_000_000,
-        );
-        lines.extend_from_slice(line.as_bytes());
+        let vectors = [("gyro", Some(rate)), ("accel", Some(force))];
+        imu::line(lines, (&id, Some(sample.time)), &vectors, None);
     }
 }

@@ -4,6 +4,7 @@
 //! units.
 
 use crate::records::Bytes;
+use crate::records::imu::flu;
 
 /// Standard gravity, m/s^2, of which forces are thousandths.
 const MILLI_G: f64 = 9.806_65e-3;
@@ -108,10 +109,7 @@ impl MessageSpec {
             }
         }
         // The protocol's axes are forward, right, down.
-        for vector in [&mut sample.rate, &mut sample.force] {
-            let [_, y, z] = vector;
-            (*y, *z) = (-*y, -*z);
-        }
+        (sample.rate, sample.force) = (flu(sample.rate), flu(sample.force));
         Some(sample)
     }
 }

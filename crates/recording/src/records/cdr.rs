@@ -65,6 +65,23 @@ impl Cdr {
     }
 }
 
+/// Begins a message in place of what is in `out`: a header with a stamp in ns, then `count` zeros; returns the place of
+/// the first.
+pub(crate) fn stamped(out: &mut Vec<u8>, (time, frame): (u64, &str), count: usize) -> usize {
+    let mut cdr = Cdr::within(std::mem::take(out));
+    let stamp = cdr.stamp();
+    cdr.string(frame);
+    let numbers = cdr.numbers(count);
+    *out = cdr.into_bytes();
+    let secs = i32::try_from(time / 1_000_000_000).unwrap_or(i32::MAX);
+    let nanos = (time % 1_000_000_000) as u32;
+    if let Some(place) = out.get_mut(stamp..stamp + 8) {
+        place[..4].copy_from_slice(&secs.to_le_bytes());
+        place[4..].copy_from_slice(&nanos.to_le_bytes());
+    }
+    numbers
+}
+
 /// Writes `v` as f64 from number `at` on.
 pub fn put<const N: usize>(numbers: &mut [u8], at: usize, v: [f64; N]) {
     let places = numbers.get_mut(8 * at..).unwrap_or_default();

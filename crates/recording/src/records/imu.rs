@@ -1,9 +1,12 @@
-//! `sensor_msgs/msg/Imu`: the places of its numbers, and a rate and a force -> its bytes in CDR. Pure.
+//! A sample of containers and links that have layouts of their own -> the bytes of ROS's messages, or a line. Of
+//! `sensor_msgs/msg/Imu` also the places of its numbers. Pure.
 //!
 //! Apart from who reads and who writes it, so that the places are said once: the decoders, the containers whose samples
 //! have layouts of their own, which are told as this, and the outputs.
 
-use super::cdr::{Cdr, put};
+use super::cdr::{Cdr, put, stamped};
+use std::fmt::Write;
+use strapd_attitude::record::SampleKind;
 
 /// The type.
 pub(crate) const TYPE: &str = "sensor_msgs/msg/Imu";
@@ -33,26 +36,61 @@ pub fn empty(mut cdr: Cdr, frame_id: &str) -> (Vec<u8>, usize, usize) {
     (cdr.into_bytes(), stamp, numbers)
 }
 
-/// Writes a message in place of what is in `out`: stamp in ns, rate in rad/s, force in m/s^2, no orientation.
+/// Writes a message in place of what is in `out`: stamp in ns, rate in rad/s, force in m/s^2, no orientation. Returns the
+/// place of its numbers.
 pub(crate) fn imu(
     out: &mut Vec<u8>,
-    (time, frame): (u64, &str),
+    header: (u64, &str),
     rate: [f64; 3],
     force: Option<[f64; 3]>,
-) {
-    let (mut message, stamp, numbers) = empty(Cdr::within(std::mem::take(out)), frame);
-    let secs = i32::try_from(time / 1_000_000_000).unwrap_or(i32::MAX);
-    let nanos = (time % 1_000_000_000) as u32;
-    if let Some(place) = message.get_mut(stamp..stamp + 8) {
-        place[..4].copy_from_slice(&secs.to_le_bytes());
-        place[4..].copy_from_slice(&nanos.to_le_bytes());
-    }
-    let numbers = message.get_mut(numbers..).unwrap_or_default();
+) -> usize {
+    let place = stamped(out, header, NUMBERS);
+    let numbers = out.get_mut(place..).unwrap_or_default();
     put(numbers, ORIENTATION + 3, [1.0, -1.0]);
     put(numbers, RATE, rate);
     match force {
         Some(force) => put(numbers, FORCE, force),
         None => put(numbers, FORCE_COVARIANCE, [-1.0]),
     }
-    *out = message;
+    place
+}
+
+/// Type of a magnetic field.
+pub(crate) const FIELD_TYPE: &str = "sensor_msgs/msg/MagneticField";
+
+/// Writes a magnetic field in place of what is in `out`. Of its covariance nothing is known: zeros.
+pub(crate) fn field(out: &mut Vec<u8>, header: (u64, &str), field: [f64; 3]) {
+    let place = stamped(out, header, 3 + 9);
+    put(out.get_mut(place..).unwrap_or_default(), 0, field);
+}
+
+/// Forward, right, down as forward, left, up.
+pub(crate) fn flu([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [x, -y, -z]
+}
+
+/// Appends a sample as a line that a daemon reads: its sensor, its stamp in ns, vectors by their names, and what it is.
+/// Floats are the shortest decimals that read back to the same bits.
+pub(crate) fn line(
+    to: &mut Vec<u8>,
+    (id, time): (&str, Option<u64>),
+    vectors: &[(&str, Option<[f64; 3]>)],
+    kind: Option<SampleKind>,
+) {
+    let mut line = format!("{{\"id\":{}", serde_json::Value::String(id.to_owned()));
+    // A String takes every write.
+    if let Some(time) = time {
+        let (sec, nsec) = (time / 1_000_000_000, time % 1_000_000_000);
+        let _ = write!(line, ",\"stamp\":{{\"sec\":{sec},\"nsec\":{nsec}}}");
+    }
+    for (name, vector) in vectors {
+        if let Some([x, y, z]) = vector {
+            let _ = write!(line, ",\"{name}\":[{x},{y},{z}]");
+        }
+    }
+    if let Some(kind) = kind {
+        let _ = write!(line, ",\"sample_kind\":\"{}\"", kind.name());
+    }
+    line.push_str("}\n");
+    to.extend_from_slice(line.as_bytes());
 }

@@ -9,7 +9,7 @@ use super::record::{ChannelRecord, MessageRecord, SchemaRecord};
 use std::fmt::Debug;
 
 /// Bytes by which a format is known: the first line of a table is shorter.
-pub(crate) const HEAD: usize = 4096;
+pub const HEAD: usize = 4096;
 
 /// Records one after another, as they would lie in a chunk.
 #[derive(Debug, Default)]

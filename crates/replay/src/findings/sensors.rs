@@ -6,7 +6,7 @@
 use super::{Finding, Severity};
 use crate::summary::significant;
 use strapd_attitude::condition::GyroUnit;
-use strapd_attitude::consistency::{Cause, Consistency, Disagreement};
+use strapd_attitude::consistency::{CHIPS, Cause, Consistency, Disagreement};
 use strapd_attitude::estimate::{EstimationSettings, Meaning};
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
@@ -27,18 +27,6 @@ const NEAR: std::ops::Range<f64> = 0.02..0.06;
 const UNIT: f64 = 0.1;
 /// Scatter of gravity of a cure, by that as recorded.
 const CURED: f64 = 0.6;
-/// Counts per deg/s, and ranges in deg/s, of common sensors: InvenSense and Bosch, then ST by its mdps per count.
-const COUNTS: [(f64, u32); 8] = [
-    (16.4, 2000),
-    (32.8, 1000),
-    (65.5, 500),
-    (131.0, 250),
-    (1000.0 / 70.0, 2000),
-    (1000.0 / 35.0, 1000),
-    (1000.0 / 17.5, 500),
-    (1000.0 / 8.75, 250),
-];
-
 /// A factor of the rates by its name.
 struct Named {
     /// True rates by those as they were taken.
@@ -187,7 +175,7 @@ fn named(plan: &EstimationSettings, taken: GyroUnit) -> Vec<Named> {
                 }),
         );
     }
-    for (per_degree, range) in COUNTS {
+    for (per_degree, range) in CHIPS {
         let factor = 1_f64.to_radians() / per_degree / taken.to_rad();
         all.push(Named {
             factor,

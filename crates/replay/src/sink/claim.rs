@@ -65,7 +65,10 @@ pub(super) fn is_busy(error: &io::Error) -> bool {
 
 /// Locks a file, a moment later where it is locked: a process that another thread has just begun holds what this one has
 /// closed, until it runs its own program.
-fn patiently(file: &File, lock: fn(&File) -> Result<(), TryLockError>) -> io::Result<()> {
+fn patiently(
+    file: &File,
+    mut lock: impl FnMut(&File) -> Result<(), TryLockError>,
+) -> io::Result<()> {
     for _ in 0..TRIES {
         match lock(file) {
             Err(TryLockError::WouldBlock) => thread::sleep(MOMENT),
@@ -148,18 +151,22 @@ mod tests {
     }
 
     #[test]
-    fn a_lock_that_goes_in_a_moment_is_waited_for() -> io::Result<()> {
-        let dir = tempfile::tempdir()?;
-        let path = dir.path().join("a");
-        let first = File::create(&path)?;
-        claim(&first)?;
-        let second = File::open(&path)?;
-        thread::scope(|scope| {
-            scope.spawn(|| {
-                thread::sleep(MOMENT / 2);
-                drop(first);
+    fn a_lock_that_goes_in_a_moment_is_waited_for_and_no_longer() -> io::Result<()> {
+        let file = tempfile::tempfile()?;
+        let tried = |held: u32| {
+            let mut tries = 0;
+            let taken = patiently(&file, |_| {
+                tries += 1;
+                match tries > held {
+                    true => Ok(()),
+                    false => Err(TryLockError::WouldBlock),
+                }
             });
-            claim(&second)
-        })
+            (taken.is_ok(), tries)
+        };
+        assert_eq!(tried(0), (true, 1));
+        assert_eq!(tried(TRIES), (true, TRIES + 1));
+        assert_eq!(tried(TRIES + 1), (false, TRIES + 1));
+        Ok(())
     }
 }
