@@ -92,7 +92,8 @@ pub use result::{Bias, Calibration, Counts, Estimated, Magnetometer, Outcome, Se
 pub use sample::{Sample, Samples};
 pub(crate) use settings::BIAS_SIGMA;
 pub use settings::{
-    FieldUnit, HeadingReference, MotionModel, PriorScale, PriorSigmas, SampleModel, Settings,
+    FieldUnit, HeadingReference, MotionModel, OtherClass, PriorScale, PriorSigmas, SampleModel,
+    Settings,
 };
 pub use smoothed::Smoothed;
 pub use survey::Quantisation;

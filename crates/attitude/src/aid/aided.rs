@@ -3,6 +3,7 @@
 use super::beside::VectorPairing;
 use super::calibration::CorrectionMatrices;
 use super::filter::{Filter, Innovation, Measured};
+use super::other_class::OtherClass;
 use super::settings::Settings;
 use super::world::World;
 use crate::frames::{Body, In, Nav};
@@ -157,6 +158,15 @@ impl AidedPropagator {
     #[must_use]
     pub fn with_forces_beside(mut self) -> AidedPropagator {
         self.expect_forces_beside();
+        self
+    }
+
+    /// The same where the sensor may be of another class than the settings have it.
+    #[must_use]
+    pub(crate) fn or_of(mut self, other: Option<OtherClass>) -> AidedPropagator {
+        if let Some(other) = other {
+            self.filter.may_be_of(other);
+        }
         self
     }
 

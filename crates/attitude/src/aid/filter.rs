@@ -4,6 +4,7 @@ use super::beside::VectorPairing;
 use super::calibration::{Calibration, CorrectionMatrices};
 use super::covariance::{BIAS, CROSS, FORCE_BIAS, IRON, LEAD, SCALE, TILT};
 use super::interval::Interval;
+use super::other_class::ClassDoubt;
 use super::settings::Settings;
 use super::state::State;
 use super::vertical::Vertical;
@@ -21,7 +22,7 @@ const LARGEST_FIELD: f64 = 1e6;
 /// Time for which a specific force counts for the present, s.
 const FORCE_SECS: f64 = 0.5;
 /// One sigma of the scale, and of the angles between the axes (rad), of a gyro that is none of its class.
-const WIDE: f64 = 0.01;
+pub(super) const WIDE: f64 = 0.01;
 /// Number of gaps in a row after which the sensor has become slower.
 const GAPS_IN_A_ROW: u32 = 20;
 
@@ -105,6 +106,8 @@ pub(super) struct Derived {
     pub(super) has_levelled: bool,
     /// Innovation of the last correction.
     pub(super) innovation: Innovation,
+    /// The class that the sensor may be of instead.
+    pub(super) doubt: Option<ClassDoubt>,
 }
 
 impl Filter {
@@ -121,6 +124,7 @@ impl Filter {
                 known: CorrectionMatrices::of(&Calibration::default()),
                 has_levelled: false,
                 innovation: Innovation::NONE,
+                doubt: None,
             },
         };
         filter.forget_calibration();

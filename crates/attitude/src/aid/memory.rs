@@ -55,6 +55,7 @@ impl AidedPropagator {
         }
         self.filter.state = memory.filter.clone();
         self.filter.derived.known = CorrectionMatrices::of(&memory.filter.calibration);
+        self.filter.weigh_classes();
         self.stream = memory.stream.clone();
         self.is_resumed = false;
         true
@@ -72,7 +73,7 @@ impl Memory {
     pub(crate) fn is_plausible(&self) -> bool {
         let Memory { filter, stream } = self;
         let calibration = &filter.calibration;
-        let scalars = [filter.disturbance, filter.since_force];
+        let scalars = [filter.disturbance, filter.since_force, filter.class_log];
         let vectors = [&filter.mean_acceleration, &filter.last_rate];
         let unseen = [&filter.last_force, &filter.last_up];
         let mut beside = stream.forces.iter().chain([&stream.fields]);
@@ -237,7 +238,7 @@ mod tests {
         let _ = fed(&mut whole, 0..500);
         let (propagation, memory) = whole.memory().unwrap();
         let mut text = serde_json::to_value(&memory).unwrap();
-        for later in ["vertical", "drift"] {
+        for later in ["vertical", "drift", "class_log"] {
             assert!(text.as_object_mut().unwrap().remove(later).is_some());
         }
         let rest = text["rest"].as_object_mut().unwrap();
@@ -245,6 +246,7 @@ mod tests {
         let older: Memory = serde_json::from_value(text).unwrap();
         assert_eq!(older.filter.vertical, Vertical::default());
         assert_eq!(older.filter.drift, Drift::default());
+        assert_eq!(older.filter.class_log, 0.0);
         let mut other = aided(Method::Auto);
         assert!(other.recall((&propagation, &older)));
         assert_eq!(fed(&mut other, 500..600).len(), 100);
@@ -258,7 +260,7 @@ mod tests {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..50);
         let (propagation, memory) = whole.memory().unwrap();
-        let of_filter = "calibration correction covariance disturbance drift fields forces gaps_in_a_row given interval \
+        let of_filter = "calibration class_log correction covariance disturbance drift fields forces gaps_in_a_row given interval \
                          is_started is_widened last last_force last_out last_rate last_up mean_acceleration nominal \
                          plausibility position report residuals rest since_force surroundings velocity vertical \
                          wants_level world";
@@ -289,7 +291,7 @@ mod tests {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..500);
         let (propagation, good) = whole.memory().unwrap();
-        let spoil: [fn(&mut Memory); 9] = [
+        let spoil: [fn(&mut Memory); 10] = [
             |m| m.filter.correction = Quaternion::assume_unit([2.0, 0.0, 0.0, 0.0]),
             |m| m.filter.calibration.bias.x = 1e3,
             |m| m.filter.covariance = Covariance::try_from(vec![-1.0; 231]).unwrap(),
@@ -298,6 +300,7 @@ mod tests {
             |m| m.filter.calibration.hard_iron.y = f64::NAN,
             |m| m.filter.velocity[1] = f64::NAN,
             |m| m.filter.nominal = -1.0,
+            |m| m.filter.class_log = f64::NAN,
             |m| m.filter.vertical.take(&Vector3::z(), -50.0, 0.05),
             |m| m.stream.forces = Some(VectorPairing::default()),
         ];

@@ -165,5 +165,6 @@ impl Filter {
         self.state.is_widened = false;
         self.state.vertical = Vertical::default();
         self.state.drift = Drift::default();
+        self.forget_class();
     }
 }

@@ -59,5 +59,8 @@ pub(super) struct State {
     /// Whether the gyro was found to be none of its class, and its scale and axes are looked for farther off.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(super) is_widened: bool,
+    /// Logarithm of how many times likelier the sensor is of the [other class](super::OtherClass).
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) class_log: f64,
     pub(super) report: Report,
 }

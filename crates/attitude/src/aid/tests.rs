@@ -3,5 +3,6 @@
 mod drift;
 mod golden;
 mod iron;
+mod other_class;
 mod planar;
 mod probes;

@@ -40,6 +40,7 @@ impl Filter {
         }
         self.inject(&correction);
         self.widen();
+        self.find_class();
         self.state.interval = Interval::default();
         let attitude = self.state.correction.wxyz();
         if !self.state.covariance.is_sound() || !attitude.iter().all(|c| c.is_finite()) {
@@ -273,11 +274,15 @@ impl Filter {
         for axis in 0..3 {
             earth[(axis, axis)] += white;
         }
+        earth *= COLOURED;
+        if let Some(more) = self.by_other_class() {
+            earth += more;
+        }
         let carried = r.transpose() * earth;
         let (late, case) = (settings.delay.powi(2), settings.case.powi(2));
         let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|(i, j)| {
             let of_filter: f64 = (0..3).map(|k| carried[(i, k)] * r[(k, j)]).sum();
-            of_filter * COLOURED + rate[i] * rate[j] * late + if i == j { case } else { 0.0 }
+            of_filter + rate[i] * rate[j] * late + if i == j { case } else { 0.0 }
         });
         AttitudeCovariance::from_upper(upper)
     }

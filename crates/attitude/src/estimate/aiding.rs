@@ -4,7 +4,7 @@
 //! specific force (phones export acceleration without gravity) would level to anything.
 
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::noise_presets::NOISE_PRESETS;
+use super::noise_presets::{NOISE_PRESETS, UNCALIBRATED};
 use super::plan::{Aid, EstimationSettings, Initial, Noise};
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
@@ -228,12 +228,21 @@ impl Aiding {
     }
 
     /// The same for a sensor of the class of `plan`.
-    pub(super) fn of_class(self, plan: &EstimationSettings, resolved: &Meaning) -> Aiding {
+    fn of_class(self, plan: &EstimationSettings, resolved: &Meaning) -> Aiding {
         let mut settings = Aiding::with_scale((plan, resolved), self.force_scale).settings;
         if plan.bias.left().is_some() {
             settings.bias_prior = self.settings.bias_prior;
         }
         Aiding { settings, ..self }
+    }
+
+    /// The same for a sensor that nobody calibrated.
+    pub(super) fn uncalibrated(self, plan: &EstimationSettings, resolved: &Meaning) -> Aiding {
+        let plan = EstimationSettings {
+            noise: Noise::preset(UNCALIBRATED),
+            ..plan.clone()
+        };
+        self.of_class(&plan, resolved)
     }
 
     fn with_scale((plan, resolved): (&EstimationSettings, &Meaning), force_scale: f64) -> Aiding {

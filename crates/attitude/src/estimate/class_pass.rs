@@ -6,8 +6,8 @@
 use super::aiding::Aiding;
 use super::first_pass::MANY;
 use super::meaning::{Meaning, STANDARD_GRAVITY};
-use super::noise_presets::{NOISE_PRESETS, NoisePreset};
-use super::plan::{Aid, EstimationSettings, Noise};
+use super::noise_presets::{NOISE_PRESETS, UNCALIBRATED};
+use super::plan::{Aid, EstimationSettings};
 use crate::aid::{AidedPropagator, Calibration, Settings};
 use crate::condition::{self, Clock, CoarseClock, Conditioner};
 use crate::diagnostic::Diagnostic;
@@ -19,8 +19,6 @@ use crate::record::{AttitudeSample, Nanos, RawSample, Status};
 use crate::setting::NOISE;
 use nalgebra::Vector3;
 
-/// The class of a sensor that nobody calibrated.
-const WIDE: &NoisePreset = &NOISE_PRESETS[1];
 /// Logarithm of how many times likelier a sensor must be of that class to be taken for one. Calibrated ones had -1.6 to
 /// -15 on the 14 recordings of BROAD, and 4.5 at most in simulations: on a circle, whose steady acceleration looks like
 /// an accelerometer's bias.
@@ -34,7 +32,7 @@ const METHOD: Method = Method::Magnus {
 /// Sigmas of the length of a specific force at rest less standard gravity, m/s^2: of a calibrated accelerometer,
 /// gravity's own differences over the Earth included, and what is added to it where nobody calibrated.
 const CALIBRATED: f64 = 0.04;
-const UNCALIBRATED: f64 = 0.2;
+const LOOSE: f64 = 0.2;
 
 /// A sample, as far as it is kept.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +58,20 @@ pub(super) struct Run<'a> {
     pub(super) aiding: Aiding,
 }
 
+/// Whether neither the plan nor a calibration says of which class the sensor is, and something tells it.
+pub(super) fn is_open(plan: &EstimationSettings) -> bool {
+    plan.noise.is_by_data() && plan.calibration.is_none() && plan.aid != Aid::None
+}
+
+/// Class of a sensor by its data.
+#[derive(Debug)]
+pub(super) enum ToldClass {
+    /// Clearly one that nobody calibrated: what corrects the attitude with the priors of that, and why.
+    Uncalibrated(Aiding, Diagnostic),
+    /// Not clear: the logarithm of how many times likelier it is that nobody calibrated it.
+    Open(f64),
+}
+
 /// Samples kept until they can be weighed.
 #[derive(Debug, Default)]
 pub(super) struct ClassPass(Vec<StoredSample>);
@@ -77,8 +89,7 @@ struct Evidence {
 impl ClassPass {
     /// Makes one where the class is to be found.
     pub(super) fn of(plan: &EstimationSettings) -> Option<ClassPass> {
-        let is_open = plan.noise.is_by_data() && plan.calibration.is_none();
-        (is_open && plan.aid != Aid::None).then(ClassPass::default)
+        is_open(plan).then(ClassPass::default)
     }
 
     /// Takes the next sample.
@@ -99,17 +110,17 @@ impl ClassPass {
         self.0.len() < MANY
     }
 
-    /// The class `uncalibrated`, what corrects the attitude with its priors, and why it is taken, where that is clear.
-    pub(super) fn told(self, run: &Run<'_>) -> Option<(Noise, Aiding, Diagnostic)> {
-        let noise = Noise::preset(WIDE);
-        let plan = EstimationSettings {
-            noise: noise.clone(),
-            ..run.plan.clone()
-        };
-        let aiding = run.aiding.of_class(&plan, run.resolved);
+    /// Which class the samples tell; `None` where they cannot be weighed.
+    pub(super) fn told(self, run: &Run<'_>) -> Option<ToldClass> {
+        let aiding = run.aiding.uncalibrated(run.plan, run.resolved);
         let evidence = self.weigh(run, &aiding)?;
-        let is_clear = evidence.log > CLEAR && evidence.is_within(&aiding.settings);
-        is_clear.then(|| (noise, aiding, evidence.said()))
+        Some(
+            if evidence.log > CLEAR && evidence.is_within(&aiding.settings) {
+                ToldClass::Uncalibrated(aiding, evidence.said())
+            } else {
+                ToldClass::Open(evidence.log)
+            },
+        )
     }
 
     /// Weighs the samples by a filter of the wide class.
@@ -194,7 +205,7 @@ impl Evidence {
         let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
         let mut what = format!(
             "taken for a sensor that nobody calibrated (class {}): by these data that is e^{:.0} times likelier (scale {} %, axes {} deg, accelerometer {} m/s^2",
-            WIDE.name,
+            UNCALIBRATED.name,
             self.log,
             largest(&self.found.scale, 100.0),
             largest(&self.found.cross, 1f64.to_degrees()),
@@ -215,7 +226,7 @@ impl Evidence {
 /// Evidence of the length of a specific force at rest.
 fn by_length(off: f64) -> f64 {
     let narrow = CALIBRATED * CALIBRATED;
-    let wide = narrow + UNCALIBRATED * UNCALIBRATED;
+    let wide = narrow + LOOSE * LOOSE;
     0.5 * ((narrow / wide).ln() + off * off * (1.0 / narrow - 1.0 / wide))
 }
 
@@ -262,6 +273,7 @@ impl Rests {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::estimate::Noise;
     use crate::estimate::{Patience, Preparation, Prepared};
     use crate::quaternion::RotationVector;
     use crate::record::Declared;
@@ -313,7 +325,7 @@ mod tests {
     fn a_sensor_that_nobody_calibrated_is_taken_for_one_and_that_is_said() {
         let off = Vector3::new(0.2, -0.15, 0.1);
         let found = prepared(Noise::by_data(), 0.015, off);
-        assert_eq!(found.noise.name, WIDE.name);
+        assert_eq!(found.noise.name, UNCALIBRATED.name);
         assert_eq!(codes(&found), ["class-by-data"]);
         assert!((found.aiding.unwrap().settings.scale_prior - 0.01).abs() < 1e-12);
         // Who states a class is believed.

@@ -11,6 +11,7 @@ use super::kept::{Spool, SpoolError};
 use super::magnetometer_watch::MagnetometerWatch;
 use super::meaning::Meaning;
 use super::memory::Memory;
+use super::noise_presets::UNCALIBRATED;
 use super::open_kind::{Event, OpenKind};
 use super::output_frame::{OutputFrame, turned_north};
 use super::plan::{EstimationSettings, Initial, Noise};
@@ -19,7 +20,7 @@ use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
 use super::smoothing_priors::looseness;
-use crate::aid::{self, AidedPropagator};
+use crate::aid::{self, AidedPropagator, OtherClass};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
 use crate::consistency::{Consistency, FieldConsistency};
@@ -179,6 +180,17 @@ impl Estimator {
                         Forces::Beside => aided.with_forces_beside(),
                         Forces::WithRates | Forces::Unseen => aided,
                     };
+                    let wide = prepared.is_class_open.then(|| {
+                        let wide = aiding.uncalibrated(plan, resolved).settings;
+                        let noise = Noise::preset(UNCALIBRATED);
+                        (looseness(&wide, &noise), wide)
+                    });
+                    let aided = aided.or_of(wide.map(|(_, wide)| OtherClass {
+                        scale_prior: wide.scale_prior,
+                        cross_prior: wide.cross_prior,
+                        force_bias_prior: wide.force_bias_prior,
+                        log: prepared.class_log,
+                    }));
                     if plan.smooth {
                         let heading = match aiding.start {
                             aid::Start::Level | aid::Start::LevelBy(_) => None,
@@ -188,6 +200,7 @@ impl Estimator {
                             kind: resolved.kind,
                             heading,
                             looseness: looseness(&aiding.settings, &prepared.noise),
+                            other: wide.map(|(looseness, _)| looseness),
                             is_class_found: plan.noise.is_by_data()
                                 && prepared.noise != plan.noise.taken(),
                             bias_sigma: prepared.noise.bias_of_class(),

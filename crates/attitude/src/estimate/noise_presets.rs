@@ -1,5 +1,8 @@
 //! Classes of gyros by name, with the figures of their data sheets. Pure.
 
+/// The class of a sensor that nobody calibrated.
+pub(super) const UNCALIBRATED: &NoisePreset = &NOISE_PRESETS[1];
+
 /// A named class of gyros, by data sheets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct NoisePreset {

@@ -13,10 +13,11 @@ use self::kind::decide_kind;
 use self::rates::{clipped_at, decide_truncation, looks_for_truncation};
 use self::stamps::{decide_clock, decide_stamps};
 use super::aiding::Aiding;
-use super::class_pass::{self, ClassPass};
+use super::class_pass::{self, ClassPass, ToldClass};
 use super::clock_pass::ClockPass;
 use super::first_pass::{FEW, MANY, RestPass};
 use super::meaning::Meaning;
+use super::noise_presets::UNCALIBRATED;
 use super::orientation_lag::LagPass;
 use super::plan::{Aid, Bias, EstimationSettings, Initial, Noise, Truncation};
 use super::sample_kind::KindChoice;
@@ -70,6 +71,10 @@ pub struct Prepared {
     pub stamps: Stamps,
     /// Whether log times tell when samples arrived: those of a recording do, those of a daemon are another in every run.
     pub has_arrival: bool,
+    /// Whether the sensor may as well be one that nobody calibrated: nobody said it, and no data did.
+    pub is_class_open: bool,
+    /// Logarithm of how many times likelier it is one; `None`: not weighed.
+    pub class_log: Option<f64>,
     /// Aiding, if something corrects the attitude.
     pub aiding: Option<Aiding>,
     /// Step in which the driver cut the rates, rad/s, where that is undone.
@@ -372,6 +377,8 @@ impl Preparation {
             world,
             stamps,
             has_arrival: true,
+            is_class_open: class_pass::is_open(&plan),
+            class_log: None,
             batches: clocks.batches,
             coarse: clocks.coarse,
             warnings,
@@ -389,10 +396,15 @@ impl Preparation {
                 aiding,
             })
         });
-        if let Some((noise, aiding, why)) = told {
-            prepared.noise = noise;
-            prepared.aiding = Some(aiding);
-            prepared.warnings.push(why);
+        match told {
+            Some(ToldClass::Uncalibrated(aiding, why)) => {
+                prepared.noise = Noise::preset(UNCALIBRATED);
+                prepared.aiding = Some(aiding);
+                prepared.warnings.push(why);
+                prepared.is_class_open = false;
+            }
+            Some(ToldClass::Open(log)) => prepared.class_log = Some(log),
+            None => {}
         }
         Ok(prepared)
     }
@@ -472,6 +484,8 @@ pub fn at_once(
     Ok(Prepared {
         sample_kind: resolved.kind_choice(),
         has_arrival: false,
+        is_class_open: class_pass::is_open(plan),
+        class_log: None,
         batches: None,
         coarse: None,
         noise: plan.noise.taken(),

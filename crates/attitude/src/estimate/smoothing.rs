@@ -14,8 +14,8 @@ use crate::record::{
     AttitudeCovariance, AttitudeSample, Join, Nanos, RateSample, SampleKind, Status,
 };
 use crate::smooth::{
-    Estimate, Estimated, FORCE_SCALE, FieldUnit, Outcome, PriorScale, PriorSigmas, Sample,
-    SampleModel, Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
+    Estimate, Estimated, FORCE_SCALE, FieldUnit, OtherClass, Outcome, PriorScale, PriorSigmas,
+    Sample, SampleModel, Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
 };
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -37,6 +37,8 @@ pub(super) struct SmoothingInputs {
     pub(super) heading: Option<f64>,
     /// Ratio of this sensor's errors to those of the default class.
     pub(super) looseness: PriorScale,
+    /// The same of a sensor that nobody calibrated, where it may as well be one.
+    pub(super) other: Option<PriorScale>,
     /// The class, and so that ratio, is one that the data told.
     pub(super) is_class_found: bool,
     /// Standard deviation of the gyro's bias in its class, rad/s.
@@ -339,6 +341,10 @@ impl Smoothing {
             bias_sigma: self.told.bias_sigma,
             gyro_range: self.told.gyro_range,
             looseness: self.told.looseness,
+            other: self.told.other.map(|looseness| OtherClass {
+                looseness,
+                probability: self.aided.filter().other_class_probability(),
+            }),
             known,
             // What a driver cut off is put back before, where it is.
             undo_truncation: false,
@@ -358,6 +364,7 @@ impl Smoothing {
         };
         let looser = Settings {
             looseness: settings.looseness.times(LOOSER),
+            other: None,
             known: settings.known.widened(LOOSER_KNOWN),
             ..settings
         };
@@ -541,6 +548,7 @@ mod tests {
                 bias_sigma: BIAS_SIGMA,
                 gyro_range: 0.0,
                 looseness: PriorScale::default(),
+                other: None,
                 is_class_found: false,
                 known: PriorSigmas::default(),
             },

@@ -3,7 +3,7 @@
 //! Apart from the nodes because these are the border of the equations: every node sees them.
 
 use super::settings::{PriorScale, PriorSigmas, Settings};
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.
 pub(super) const GYRO: usize = 0;
@@ -141,6 +141,33 @@ impl Priors {
         };
         priors.narrow(&settings.known);
         priors
+    }
+
+    /// Covariance of the constants that this sensor may have beyond these priors, where it may be of another class,
+    /// between two inverse covariances of these: with the covariance C of an attitude and of the constants, an attitude
+    /// that was solved by these priors has the variance `C doubt C'` more (Schmidt's consider covariance).
+    pub(super) fn doubt(&self, settings: &Settings) -> Option<Vec<[f64; ALL]>> {
+        const SENSOR: usize = CENTRE;
+        let other = settings.other?;
+        let wide = Priors::new(
+            &Settings {
+                looseness: other.looseness,
+                other: None,
+                ..*settings
+            },
+            true,
+        );
+        let of =
+            |priors: &Priors| DMatrix::from_fn(SENSOR, SENSOR, |i, j| priors.information[i][j]);
+        let (narrow, covariance) = (of(self), of(&wide).try_inverse()?);
+        let more = (&narrow * covariance * &narrow - &narrow) * other.probability;
+        let mut doubt = vec![[0.0; ALL]; ALL];
+        for i in 0..SENSOR {
+            for j in 0..SENSOR {
+                doubt[i][j] = 0.5 * (more[(i, j)] + more[(j, i)]);
+            }
+        }
+        Some(doubt)
     }
 
     /// Takes up what is known of this sensor.

@@ -118,6 +118,15 @@ impl PriorScale {
     }
 }
 
+/// Class that a sensor may be of instead, where neither anybody nor the data said which: sigma covers both.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct OtherClass {
+    /// Its priors, in the unit of [`Settings::looseness`].
+    pub looseness: PriorScale,
+    /// Probability that the sensor is of it.
+    pub probability: f64,
+}
+
 /// Settings of the smoother, SI, beside the noise that `docs/theory/smoother.md` fixes. The defaults are one set for
 /// all sensors and motions it was judged on.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -130,6 +139,8 @@ pub struct Settings {
     pub gyro_range: f64,
     /// Ratio of the sigmas of calibration constants to those after a calibration in the factory.
     pub looseness: PriorScale,
+    /// Class that the sensor may be of instead.
+    pub other: Option<OtherClass>,
     /// Prior knowledge of this sensor.
     pub known: PriorSigmas,
     /// Delay of the samples, s: attitudes are turned on by the rate over this.
@@ -161,6 +172,7 @@ impl Default for Settings {
             bias_sigma: BIAS_SIGMA,
             gyro_range: 0.0,
             looseness: PriorScale::default(),
+            other: None,
             known: PriorSigmas::default(),
             sensor_delay: 0.0,
             heading_reference: HeadingReference::Standstill,

@@ -3,6 +3,7 @@
 //! Nodes are eliminated in order, each by the Cholesky factor of what is left of its block; what the way back needs
 //! is kept, half a dozen kilobytes a node. The right side is the last column of every border block.
 
+use super::border::ALL;
 use super::factors::STATES;
 use nalgebra::Matrix3;
 
@@ -155,8 +156,12 @@ impl<const W: usize> Solver<W> {
         Some(factor)
     }
 
-    /// Covariance of the border, and of the nodes what is asked of them.
-    pub(super) fn covariance(&self) -> Option<(Vec<Vec<f64>>, Vec<Marginal>)> {
+    /// Covariance of the border, and of the nodes what is asked of them. `doubt` is what the border's unknowns may be
+    /// farther off than was assumed, between two factors of what was assumed (`Priors::doubt`).
+    pub(super) fn covariance(
+        &self,
+        doubt: Option<&[[f64; ALL]]>,
+    ) -> Option<(Vec<Vec<f64>>, Vec<Marginal>)> {
         let last = W - 1;
         let factor = self.border_factor()?;
         let constants: Vec<Vec<f64>> = (0..last)
@@ -228,14 +233,25 @@ impl<const W: usize> Solver<W> {
             }
             p = now;
             x = cross;
+            let more = doubt.map_or_else(Matrix3::zeros, |doubt| doubted(&x, doubt));
             marginals.push(Marginal {
-                turn: Matrix3::from_fn(|i, j| 0.5 * (p[i][j] + p[j][i])),
+                turn: more + Matrix3::from_fn(|i, j| 0.5 * (p[i][j] + p[j][i])),
                 bias: [9, 10, 11].map(|i| p[i][i]),
             });
         }
         marginals.reverse();
         Some((constants, marginals))
     }
+}
+
+/// Covariance that a rotation has more, where `cross` is that of a node with the border.
+fn doubted<const W: usize>(cross: &[[f64; W]; STATES], doubt: &[[f64; ALL]]) -> Matrix3<f64> {
+    let through: [Vec<f64>; 3] = [0, 1, 2].map(|i| {
+        let row = &cross[i][..W - 1];
+        let by = |b: usize| row.iter().zip(doubt).map(|(x, m)| x * m[b]).sum();
+        (0..W - 1).map(by).collect()
+    });
+    Matrix3::from_fn(|i, j| through[i].iter().zip(&cross[j]).map(|(a, b)| a * b).sum())
 }
 
 /// Cholesky's factor by rows; whether there is one.

@@ -3,6 +3,7 @@
 mod golden;
 mod input;
 mod logs;
+mod other_class;
 mod planar;
 mod robustness;
 mod sensitivity;

@@ -19,7 +19,7 @@ use super::sample::Samples;
 use super::segments::{Cutter, STILL_RATE, Segment, find_standstill};
 use super::settings::{HeadingReference, Settings};
 use super::smoothed::{ANY_HEADING, Smoothed};
-use super::solver::{Marginal, Solver};
+use super::solver::Marginal;
 use super::start::forward;
 use super::survey::Survey;
 use super::sweep::{Sensor, sweep};
@@ -115,8 +115,10 @@ impl Solved {
         state: State,
         phase: &Phase<W>,
         iterations: [u64; 2],
+        doubt: Option<&[[f64; ALL]]>,
     ) -> Result<Solved, Failure> {
-        let known = phase.solver.as_ref().and_then(Solver::covariance);
+        let solver = phase.solver.as_ref();
+        let known = solver.and_then(|solver| solver.covariance(doubt));
         let (covariance, marginals) = known.ok_or(Failure::NotFinite)?;
         let unsettled = phase.unsettled(&marginals);
         Ok(Solved {
@@ -212,7 +214,7 @@ impl Work {
                 again = Some(nodes);
             }
             let solver = phase.solver.as_ref().filter(|_| phase.failure.is_none());
-            let covariance = solver.and_then(Solver::covariance);
+            let covariance = solver.and_then(|solver| solver.covariance(None));
             let solved = covariance
                 .as_ref()
                 .map(|(_, left)| (&state.nodes[..], &left[..]));
@@ -282,6 +284,7 @@ impl Work {
         plain: Phase<NARROW>,
     ) -> Result<Result<Solved, Failure>, S::Error> {
         let mut iterations = [plain.iterations as u64, 0];
+        let doubt = problem.priors.doubt(&self.settings);
         let has_north = turn_north(
             &self.segments,
             &plain.fields,
@@ -291,7 +294,7 @@ impl Work {
         );
         state.has_north = has_north;
         if !state.has_north.contains(&true) || self.settings.field_iterations == 0 {
-            let mut solved = Solved::of(state, &plain, iterations);
+            let mut solved = Solved::of(state, &plain, iterations, doubt.as_deref());
             if let (Ok(solved), Some(held)) = (&mut solved, held) {
                 held.widen(&self.segments, &mut solved.marginals);
                 solved.held = Some(held);
@@ -303,7 +306,7 @@ impl Work {
         iterations[1] = phase.iterations as u64;
         Ok(match phase.failure {
             Some(failure) => Err(failure),
-            None => Solved::of(state, &phase, iterations),
+            None => Solved::of(state, &phase, iterations, doubt.as_deref()),
         })
     }
 

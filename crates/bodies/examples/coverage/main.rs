@@ -17,16 +17,18 @@ mod score;
 
 use log::Log;
 use score::{Score, score};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{
     Aid, Bias, EstimationSettings, Estimator, Initial, Meaning, Noise, Patience, Preparation,
+    Prepared, at_once,
 };
-use strapd_attitude::propagate::Sequential;
+use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::record::{Declared, SampleKind};
 
 type Failure = Box<dyn std::error::Error>;
 
 /// Estimators by name; any may have a class behind a colon, `smooth:uncalibrated`.
-const ESTIMATORS: [&str; 5] = ["gyro", "default", "field", "smooth", "smooth_field"];
+const ESTIMATORS: [&str; 6] = ["gyro", "default", "live", "field", "smooth", "smooth_field"];
 
 fn plan(name: &str) -> Result<EstimationSettings, Failure> {
     let (name, class) = name.split_once(':').unwrap_or((name, ""));
@@ -42,6 +44,7 @@ fn plan(name: &str) -> Result<EstimationSettings, Failure> {
             plan.initial = Initial::Gravity;
         }
         "default" => {}
+        "live" => plan.method = Method::COMMIT,
         "field" => plan.aid = Aid::GravityAndField,
         "smooth" => plan.smooth = true,
         "smooth_field" => {
@@ -56,18 +59,38 @@ fn plan(name: &str) -> Result<EstimationSettings, Failure> {
     Ok(plan)
 }
 
-/// Attitudes of a log by a plan, and their score; what was noticed, in words.
-fn run(plan: &EstimationSettings, log: &Log) -> Result<(Score, String), Failure> {
-    let meaning = Meaning::new(plan, &Declared::default());
-    let mut preparation = Preparation::new(plan, &meaning, Patience::WholeLog);
+/// What a file that can be read twice tells before its first sample is taken.
+fn looked_through(
+    plan: &EstimationSettings,
+    meaning: &Meaning,
+    log: &Log,
+) -> Result<Prepared, Diagnostic> {
+    let mut preparation = Preparation::new(plan, meaning, Patience::WholeLog);
     for sample in &log.samples {
-        preparation.take(sample).map_err(|e| e.to_string())?;
+        preparation.take(sample)?;
         if !preparation.wants_more() {
             break;
         }
     }
-    let prepared = preparation.decide().map_err(|e| e.to_string())?;
-    let mut estimator = Estimator::new(plan, &meaning, &prepared).map_err(|e| e.to_string())?;
+    preparation.decide()
+}
+
+/// Attitudes of a log by a plan, and their score; what was noticed, in words.
+fn run(plan: &EstimationSettings, log: &Log) -> Result<(Score, String), Failure> {
+    let meaning = Meaning::new(plan, &Declared::default());
+    let is_live = plan.method == Method::COMMIT;
+    let prepared = if is_live {
+        at_once(plan, &meaning, log.samples.get(..1).unwrap_or_default())
+    } else {
+        looked_through(plan, &meaning, log)
+    };
+    let prepared = prepared.map_err(|e| e.to_string())?;
+    let estimator = if is_live {
+        Estimator::live(plan, &meaning, &prepared)
+    } else {
+        Estimator::new(plan, &meaning, &prepared)
+    };
+    let mut estimator = estimator.map_err(|e| e.to_string())?;
     let mut attitudes = Vec::with_capacity(log.samples.len());
     for sample in &log.samples {
         estimator.take(sample);

@@ -1,0 +1,63 @@
+//! A class that the sensor may be of instead: what it adds where nothing tells it, and where motion does.
+
+use super::golden::{Run, sample};
+use crate::aid::{OtherClass, Settings};
+use nalgebra::{Matrix3, Vector3};
+
+const OTHER: OtherClass = OtherClass {
+    scale_prior: 0.01,
+    cross_prior: 0.012,
+    force_bias_prior: 0.2,
+    log: None,
+};
+
+/// Variances of tilt, rad^2, of a run in a level attitude.
+fn tilt(run: &Run) -> [f64; 2] {
+    let covariance = run
+        .filter
+        .attitude_covariance(&Matrix3::identity(), &Vector3::zeros());
+    let upper = covariance.upper();
+    [upper[0], upper[3]]
+}
+
+fn at_rest(other: Option<OtherClass>) -> Run {
+    let mut run = Run::new(Settings::default());
+    if let Some(other) = other {
+        run.filter.may_be_of(other);
+    }
+    for k in 0..3000 {
+        let force = Vector3::z() * 9.81;
+        run.take(f64::from(k) * 0.01, Vector3::zeros(), Some(force), None);
+    }
+    run
+}
+
+#[test]
+fn at_rest_the_tilt_is_as_unsure_as_the_accelerometer_of_either_class() {
+    let alone = tilt(&at_rest(None));
+    for (log, probability) in [(0.0, 0.5), (2.0, 0.8808), (-4.0, 0.01799)] {
+        let log = Some(log);
+        let both = tilt(&at_rest(Some(OtherClass { log, ..OTHER })));
+        let own = Settings::default().force_bias_prior;
+        let more = probability * (0.04 - own * own) / (9.81 * 9.81);
+        for (both, alone) in both.into_iter().zip(alone) {
+            assert!(
+                ((both - alone) / more - 1.0).abs() < 0.05,
+                "{both} {alone} {more}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_body_that_turns_every_way_tells_the_class_on_the_way() {
+    let mut run = Run::new(Settings::default());
+    run.filter.may_be_of(OTHER);
+    let before = run.filter.other_class_probability();
+    for k in 0..=12_000 {
+        let (rate, force, _) = sample(k);
+        run.take(k as f64 * 0.01, rate, Some(force), None);
+    }
+    let after = run.filter.other_class_probability();
+    assert!(before == 0.5 && after < 0.2, "{before} {after}");
+}
