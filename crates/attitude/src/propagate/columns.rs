@@ -119,12 +119,12 @@ impl Track {
         Triple::new(self.x[k], self.y[k], self.z[k])
     }
 
-    /// Values of element k of N neighbouring windows.
+    /// Values of element k of the first of N windows, each of which begins STEP behind the one before.
     #[inline(always)]
-    pub(crate) fn values<const N: usize>(&self, k: usize) -> Triple<N> {
+    pub(crate) fn values<const N: usize, const STEP: usize>(&self, k: usize) -> Triple<N> {
         let at = |v: &[f64]| {
-            let v = &v[k..k + N];
-            Lanes(std::array::from_fn(|i| v[i]))
+            let v = &v[k..=k + STEP * (N - 1)];
+            Lanes(std::array::from_fn(|i| v[STEP * i]))
         };
         Triple {
             x: at(&self.x),

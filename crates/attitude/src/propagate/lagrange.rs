@@ -145,19 +145,24 @@ pub(crate) fn inner(window: usize, place: usize, increments: bool) -> Range<usiz
     fewer - newer..points - newer
 }
 
-/// Values at the Gauss nodes of the polynomial through `(x_i, f_i)`; its noise gain: the sum of
-/// squares of Lagrange's coefficients at mid-interval (1/2 for the mean of two samples); and by how much
-/// it differs there from the polynomial through the points `inner`.
+/// A polynomial: its values at the Gauss nodes; its noise gain, the sum of squares of Lagrange's coefficients at
+/// mid-interval (1/2 for the mean of two samples); and these coefficients.
+struct AtNodes<const N: usize, const P: usize> {
+    values: [Triple<N>; MOMENTS],
+    gain: Lanes<N>,
+    coefficient: [Lanes<N>; P],
+}
+
+/// The polynomial through at most P points `(x_i, f_i)`.
 #[inline(always)]
-fn at_nodes<const N: usize>(
+fn at_nodes<const N: usize, const P: usize>(
     x: &[Lanes<N>],
     f: &[Triple<N>],
-    inner: Range<usize>,
     quadrature: &Quadrature,
-) -> ([Triple<N>; MOMENTS], Lanes<N>, Triple<N>) {
-    let p = x.len().min(POINTS);
+) -> AtNodes<N, P> {
+    let p = x.len().min(P);
     let (x, f) = (&x[..p], &f[..p]);
-    let mut product = [Lanes::<N>::splat(1.0); POINTS];
+    let mut product = [Lanes::<N>::splat(1.0); P];
     for i in 0..p {
         let mut own = product[i];
         for j in i + 1..p {
@@ -168,19 +173,21 @@ fn at_nodes<const N: usize>(
         // Lower half of the product came with the opposite sign i times.
         product[i] = if i % 2 == 0 { own } else { -own };
     }
-    let mut weight = [Lanes::<N>::ZERO; POINTS];
-    let mut weighted = [Triple::<N>::ZERO; POINTS];
+    let mut weight = [Lanes::<N>::ZERO; P];
+    let mut weighted = [Triple::<N>::ZERO; P];
     for i in 0..p {
         weight[i] = product[i].recip();
         weighted[i] = f[i].times(weight[i]);
     }
-    let mut values = [Triple::ZERO; MOMENTS];
-    let mut gain = Lanes::ZERO;
-    let mut middle_coefficient = [Lanes::<N>::ZERO; POINTS];
+    let mut at = AtNodes {
+        values: [Triple::ZERO; MOMENTS],
+        gain: Lanes::ZERO,
+        coefficient: [Lanes::ZERO; P],
+    };
     let middle = quadrature.nodes / 2;
+    let mut suffix = [Lanes::<N>::splat(1.0); P];
     for (n, &g) in quadrature.nodes().iter().enumerate() {
         let g = Lanes::splat(g);
-        let mut suffix = [Lanes::<N>::splat(1.0); POINTS];
         for i in (1..p).rev() {
             suffix[i - 1] = suffix[i] * (g - x[i]);
         }
@@ -189,69 +196,108 @@ fn at_nodes<const N: usize>(
         for i in 0..p {
             let l = prefix * suffix[i];
             value = value + weighted[i].times(l);
-            if n == middle {
-                let l = l * weight[i];
-                gain = gain + l * l;
-                middle_coefficient[i] = l;
-            }
+            suffix[i] = l;
             prefix = prefix * (g - x[i]);
         }
-        values[n] = value;
+        at.values[n] = value;
+        if n == middle {
+            for i in 0..p {
+                let l = suffix[i] * weight[i];
+                at.gain = at.gain + l * l;
+                at.coefficient[i] = l;
+            }
+        }
+        if let Some(last) = suffix[..p].last_mut() {
+            *last = Lanes::splat(1.0);
+        }
     }
-    // Lagrange's coefficients at mid-interval, where x = 0, without the outer points.
+    at
+}
+
+/// Value at mid-interval, where x = 0, by the points `inner` alone, which differ where lanes share one window.
+#[inline(always)]
+fn narrower<const N: usize, const P: usize>(
+    x: &[Lanes<N>],
+    f: &[Triple<N>],
+    coefficient: &[Lanes<N>; P],
+    inner: &[Range<usize>; N],
+) -> Triple<N> {
+    if inner.iter().all(|range| *range == inner[0]) {
+        return narrower_by(x, f, coefficient, &inner[0]);
+    }
+    Triple::of_lanes(|lane| {
+        let (mut own_x, mut own_f) = ([Lanes::ZERO; P], [Triple::ZERO; P]);
+        for i in 0..x.len().min(P) {
+            (own_x[i], own_f[i]) = (Lanes([x[i].0[lane]]), f[i].lane(lane));
+        }
+        let coefficient = coefficient.map(|c| Lanes([c.0[lane]]));
+        narrower_by(&own_x[..x.len().min(P)], &own_f, &coefficient, &inner[lane])
+    })
+}
+
+/// The same by one range of points.
+#[inline(always)]
+fn narrower_by<const N: usize>(
+    x: &[Lanes<N>],
+    f: &[Triple<N>],
+    coefficient: &[Lanes<N>],
+    inner: &Range<usize>,
+) -> Triple<N> {
+    let p = x.len().min(coefficient.len());
     let outer = || (0..inner.start).chain(inner.end..p);
-    let mut reciprocal = [Lanes::<N>::ZERO; POINTS];
-    for j in outer() {
-        reciprocal[j] = x[j].recip();
+    let mut reciprocal = [Lanes::<N>::ZERO; FEWER];
+    for (reciprocal, j) in reciprocal.iter_mut().zip(outer()) {
+        *reciprocal = x[j].recip();
     }
     let mut narrow = Triple::ZERO;
     for i in inner.clone() {
-        let mut without = middle_coefficient[i];
-        for j in outer() {
-            without = without * (Lanes::splat(1.0) - x[i] * reciprocal[j]);
+        let mut without = coefficient[i];
+        for (reciprocal, _) in reciprocal.iter().zip(outer()) {
+            without = without * (Lanes::splat(1.0) - x[i] * *reciprocal);
         }
         narrow = narrow + f[i].times(without);
     }
-    (values, gain, values[middle] - narrow)
+    narrow
 }
 
 /// Moments over an interval of `h` seconds from rates at `x` (interval from -1 to 1), and the noise gain.
 ///
 /// `reference` should be near the rates: only differences from it meet rounding.
 #[inline(always)]
-pub(crate) fn from_rates<const N: usize>(
+pub(crate) fn from_rates<const N: usize, const P: usize>(
     x: &[Lanes<N>],
     rates: &mut [Triple<N>],
     reference: Triple<N>,
     h: Lanes<N>,
-    inner: Range<usize>,
+    inner: &[Range<usize>; N],
     quadrature: &Quadrature,
 ) -> (Moments<N>, Lanes<N>) {
     for rate in rates.iter_mut() {
         *rate = *rate - reference;
     }
-    let (values, gain, difference) = at_nodes(x, rates, inner, quadrature);
-    let mut m = quadrature.of_rate(&values, h);
+    let at = at_nodes::<N, P>(x, rates, quadrature);
+    let difference = at.values[quadrature.nodes / 2] - narrower(x, rates, &at.coefficient, inner);
+    let mut m = quadrature.of_rate(&at.values, h);
     m.b[0] = m.b[0] + reference.times(h);
     // Both polynomials pass through the ends of the interval: between them they differ by about a parabola.
     m.outer = difference.times(h) * (2.0 / 3.0);
-    (m, gain)
+    (m, at.gain)
 }
 
 /// Moments over the interval of increment `own` from contiguous increments between the knots `x`
 /// (one more than increments), and the noise gain. The delta angle itself passes untouched.
 #[inline(always)]
-pub(crate) fn from_increments<const N: usize>(
+pub(crate) fn from_increments<const N: usize, const P: usize>(
     x: &[Lanes<N>],
     increments: &[Triple<N>],
     own: usize,
-    inner: Range<usize>,
+    inner: &[Range<usize>; N],
     quadrature: &Quadrature,
 ) -> (Moments<N>, Lanes<N>) {
-    let count = increments.len().min(POINTS - 1);
+    let count = increments.len().min(P - 1);
     let delta = increments[own];
     // The angle beyond what a constant rate would have made; it vanishes at both ends of the interval.
-    let mut angle = [Triple::<N>::ZERO; POINTS];
+    let mut angle = [Triple::<N>::ZERO; P];
     let surplus = |i: usize| increments[i] - delta.times((x[i + 1] - x[i]) * 0.5);
     for i in own + 1..count {
         angle[i + 1] = angle[i] + surplus(i);
@@ -259,12 +305,14 @@ pub(crate) fn from_increments<const N: usize>(
     for i in (0..own).rev() {
         angle[i] = angle[i + 1] - surplus(i);
     }
-    let (values, gain, difference) = at_nodes(x, &angle[..=count], inner, quadrature);
-    let mut m = quadrature.of_angle(&values);
+    let angle = &angle[..=count];
+    let at = at_nodes::<N, P>(x, angle, quadrature);
+    let difference = at.values[quadrature.nodes / 2] - narrower(x, angle, &at.coefficient, inner);
+    let mut m = quadrature.of_angle(&at.values);
     m.live = m.live.min(count.max(1));
     m.b[0] = delta;
     m.outer = difference * (2.0 / 3.0);
-    (m, gain)
+    (m, at.gain)
 }
 
 #[cfg(test)]

@@ -135,6 +135,17 @@ impl<const N: usize> Triple<N> {
         }
     }
 
+    /// Makes it lane by lane.
+    #[inline(always)]
+    pub(crate) fn of_lanes(lane: impl Fn(usize) -> Triple<1>) -> Self {
+        let each: [Triple<1>; N] = from_fn(lane);
+        Triple {
+            x: Lanes(from_fn(|i| each[i].x.0[0])),
+            y: Lanes(from_fn(|i| each[i].y.0[0])),
+            z: Lanes(from_fn(|i| each[i].z.0[0])),
+        }
+    }
+
     /// One lane as a vector of a single lane.
     #[inline(always)]
     pub(crate) fn lane(self, i: usize) -> Triple<1> {

@@ -43,14 +43,34 @@ impl<const N: usize> Moments<N> {
     }
 }
 
+impl Moments<1> {
+    /// Moments of this interval and of another, side by side; of windows with as many points.
+    #[inline(always)]
+    pub(crate) fn beside(&self, other: &Moments<1>) -> Moments<2> {
+        let pair = |a: Triple<1>, b: Triple<1>| Triple::of_lanes(|lane| [a, b][lane]);
+        Moments {
+            b: std::array::from_fn(|j| pair(self.b[j], other.b[j])),
+            live: self.live,
+            outer: pair(self.outer, other.outer),
+        }
+    }
+}
+
 /// The second-order term, exact for any polynomial rate: only neighbours couple.
 #[inline(always)]
 fn coning_sum<const N: usize>(m: &Moments<N>) -> Triple<N> {
     let mut sum = Triple::ZERO;
     for j in (0..m.live - 1).rev() {
-        sum = sum + m.b[j].cross(m.b[j + 1]) * CONING[j];
+        add_cross(&mut sum, &m.b[j], &m.b[j + 1], CONING[j]);
     }
     sum
+}
+
+/// Adds a weighted cross product.
+// Called, since in the loop the compiler keeps each moment for the next product, and takes lanes apart for it.
+#[inline(never)]
+fn add_cross<const N: usize>(sum: &mut Triple<N>, a: &Triple<N>, b: &Triple<N>, weight: f64) {
+    *sum = *sum + a.cross(*b) * weight;
 }
 
 /// Weights of the coning sum: 1/2 / ((2j + 1)(2j + 3)).

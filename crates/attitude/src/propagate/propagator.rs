@@ -16,7 +16,7 @@ use super::turn::Turn;
 use super::window::{Step, WindowKernel};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
-use crate::record::{AttitudeSample, Join, Measured, RateSample, SampleKind, Status};
+use crate::record::{AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
 use state::{Output, PendingSample};
 use std::collections::VecDeque;
@@ -102,6 +102,15 @@ enum Engine {
         open: VecDeque<PendingSample>,
     },
     Classical(Method),
+}
+
+/// Value of a sample that can be calculated with.
+struct Trusted {
+    /// Rate or increment, as announced.
+    value: Vector3<f64>,
+    /// Start of its interval.
+    start: Nanos,
+    status: Status,
 }
 
 impl Propagator {
@@ -249,9 +258,10 @@ impl Propagator {
 
     /// First sample of a run.
     fn begin(&mut self, sample: &RateSample, out: &mut Vec<AttitudeSample>) {
+        self.output.state.rates.sample = self.last_rate();
         self.track.clear();
         self.next = 1;
-        let sample = self.trusted(sample);
+        let trusted = self.trusted(sample);
         let resumed = std::mem::take(&mut self.resumed);
         let first = self.output.report.samples == 0 && !resumed;
         self.output.begin(sample.stamp.0);
@@ -280,92 +290,110 @@ impl Propagator {
             self.output.state.added = self.output.state.added.with(Status::RESTARTED);
         }
         self.started = true;
-        self.append(&sample);
+        self.append(sample, &trusted);
         let rate = self.track.rate(0);
-        self.output.output_at(&sample, Some(rate), out);
+        let pending = PendingSample::of(sample, trusted.status, true);
+        self.output.output_at(&pending, Some(rate), out);
     }
 
     /// Any later sample of a run.
+    #[inline]
     fn admit(&mut self, sample: &RateSample) {
-        let mut sample = self.trusted(sample);
+        let mut trusted = self.trusted(sample);
         // Nothing is missing, or it was held: `begin` says so itself.
         if std::mem::take(&mut self.resumed) && sample.join == Join::Bridge {
-            sample.status = sample.status.with(Status::RESTARTED);
+            trusted.status = trusted.status.with(Status::RESTARTED);
         }
         let turns = sample.stamp.0 > self.output.state.last;
         if turns {
-            self.append(&sample);
+            self.append(sample, &trusted);
         } else {
             self.output.report.stalled += 1;
         }
-        self.queue.push_back(PendingSample { sample, turns });
+        self.queue
+            .push_back(PendingSample::of(sample, trusted.status, turns));
     }
 
-    fn append(&mut self, sample: &RateSample) {
-        let value = (*sample.gyro.as_vector()).into();
+    #[inline]
+    fn append(&mut self, sample: &RateSample, trusted: &Trusted) {
         let bridged = sample.join == Join::Bridge;
-        self.track
-            .push(sample.stamp.0, sample.start.0, value, bridged);
-        let rate = self.track.rate(self.track.len() - 1);
-        self.output.state.rates.sample = rate.into();
+        self.track.push(
+            sample.stamp.0,
+            trusted.start.0,
+            trusted.value.into(),
+            bridged,
+        );
         self.output.state.last = sample.stamp.0;
     }
 
-    /// The sample, with a value that can be calculated with: one that is not finite, or that no gyro
-    /// delivers, becomes the rate before, and says so.
-    fn trusted(&mut self, sample: &RateSample) -> RateSample {
-        let limit = if self.track.increments {
-            LARGEST
-        } else {
-            FASTEST
+    /// Value of a sample that can be calculated with, a rate or an increment, whichever [`Settings::kind`] has said:
+    /// windows hold one of the two.
+    #[inline]
+    fn trusted(&mut self, sample: &RateSample) -> Trusted {
+        let (value, start) = match (sample.gyro, self.track.increments) {
+            (Measured::Rate(_), false) | (Measured::Increment(_), true) => {
+                (*sample.gyro.as_vector(), sample.start)
+            }
+            // Whatever interval it had: its rate counts since the sample before.
+            (other, _) => (self.converted(sample, other), sample.stamp),
         };
-        let sample = &self.as_announced(sample);
-        if sample.gyro.as_vector().iter().all(|v| v.abs() <= limit) {
-            return *sample;
+        let limit = self.limit();
+        let trusted = Trusted {
+            value,
+            start,
+            status: sample.status,
+        };
+        match value.iter().all(|v| v.abs() <= limit) {
+            true => trusted,
+            false => self.replaced(sample, &trusted),
         }
+    }
+
+    /// Rate of the last sample, rad/s; before the first that of the run before.
+    fn last_rate(&self) -> [f64; 3] {
+        match self.track.len().checked_sub(1) {
+            Some(last) => self.track.rate(last).into(),
+            None => self.output.state.rates.sample,
+        }
+    }
+
+    /// Largest value that a gyro delivers.
+    fn limit(&self) -> f64 {
+        match self.track.increments {
+            true => LARGEST,
+            false => FASTEST,
+        }
+    }
+
+    /// The rate before stands in for a value that is not finite, or that no gyro delivers, and says so.
+    #[cold]
+    fn replaced(&mut self, sample: &RateSample, trusted: &Trusted) -> Trusted {
         self.output.report.rejected += 1;
-        let mut sample = *sample;
-        sample.status = sample.status.with(Status::REJECTED_BEFORE);
-        let [x, y, z] = self.output.state.rates.sample;
-        let factor = if self.track.increments {
-            secs(sample.stamp.since(sample.start).max(0))
-        } else {
-            1.0
+        let [x, y, z] = self.last_rate();
+        let factor = match self.track.increments {
+            true => secs(sample.stamp.since(trusted.start).max(0)),
+            false => 1.0,
         };
         let before = Vector3::new(x, y, z) * factor;
-        let is_small = before.iter().all(|v| v.abs() <= limit);
-        sample.gyro = sample
-            .gyro
-            .with(if is_small { before } else { Vector3::zeros() });
-        sample
-    }
-
-    /// The sample with a rate or an increment, whichever [`Settings::kind`] has said: windows hold one of the two.
-    #[inline(always)]
-    fn as_announced(&self, sample: &RateSample) -> RateSample {
-        match (sample.gyro, self.track.increments) {
-            (Measured::Rate(_), false) | (Measured::Increment(_), true) => *sample,
-            (other, _) => self.converted(sample, other),
+        let is_small = before.iter().all(|v| v.abs() <= self.limit());
+        Trusted {
+            value: if is_small { before } else { Vector3::zeros() },
+            start: trusted.start,
+            status: trusted.status.with(Status::REJECTED_BEFORE),
         }
     }
 
-    /// Converts a sample of a kind that was not announced: a rate is taken as held since the sample before, an
+    /// Converts a value of a kind that was not announced: a rate is taken as held since the sample before, an
     /// increment as its mean rate.
     #[cold]
-    fn converted(&self, sample: &RateSample, other: Measured) -> RateSample {
-        let gyro = match other {
-            Measured::Increment(_) => Measured::Rate(sample.mean_rate()),
+    fn converted(&self, sample: &RateSample, other: Measured) -> Vector3<f64> {
+        match other {
+            Measured::Increment(_) => sample.mean_rate().0,
             Measured::Rate(rate) => {
                 let since = sample.stamp.0.saturating_sub(self.output.state.last).max(0);
                 let is_first = self.track.len() == 0;
-                Measured::Increment(rate.held_for(if is_first { 0.0 } else { secs(since) }))
+                rate.held_for(if is_first { 0.0 } else { secs(since) }).0
             }
-        };
-        // Whatever interval it had: its rate counts since the sample before.
-        RateSample {
-            gyro,
-            start: sample.stamp,
-            ..*sample
         }
     }
 
@@ -448,14 +476,9 @@ impl Propagator {
         let Engine::Commit { plan, finals, open } = &mut self.engine else {
             return;
         };
-        while let Some(PendingSample { sample, turns }) = self.queue.pop_front() {
+        while let Some(sample) = self.queue.pop_front() {
             let newest = self.track.len() - 1;
-            let rate = if turns {
-                Some(self.track.rate(newest))
-            } else {
-                None
-            };
-            let committed_at = self.output.state.now;
+            let rate = sample.turns.then(|| self.track.rate(newest));
             let mut ahead = self.output.attitude;
             let mut covariance = self.output.covariance;
             let mut difference = self.output.difference;
@@ -473,23 +496,20 @@ impl Propagator {
                     covariance.bridge(step.gap_variance);
                 }
                 covariance.advance(turned.parts(), span);
-                if let (true, Some(step)) = (turns, self.scratch.last()) {
+                if let (true, Some(step)) = (sample.turns, self.scratch.last()) {
                     self.output.state.added = self.output.state.added.with(step.status());
+                }
+                self.output.state.added = self.output.state.added.with(Status::PROVISIONAL);
+                if *finals {
+                    open.push_back(sample);
                 }
             }
             self.output.difference.seen(&difference);
-            let committed = (self.output.attitude, self.output.covariance);
-            (self.output.attitude, self.output.covariance) = (ahead, covariance);
-            self.output.state.now = self.track.stamp[newest];
-            if newest >= self.next {
-                self.output.state.added = self.output.state.added.with(Status::PROVISIONAL);
-                if *finals {
-                    open.push_back(PendingSample { sample, turns });
-                }
-            }
-            self.output.output_at(&sample, rate, out);
-            (self.output.attitude, self.output.covariance) = committed;
-            self.output.state.now = committed_at;
+            let committed = std::mem::replace(&mut self.output.attitude, ahead);
+            let now = std::mem::replace(&mut self.output.state.now, self.track.stamp[newest]);
+            self.output
+                .output_known(&sample, rate, covariance.attitude(), out);
+            (self.output.attitude, self.output.state.now) = (committed, now);
         }
     }
 

@@ -4,7 +4,7 @@
 //! of its window it splits in two halves: even moments see sums of samples left and right, odd ones
 //! differences. The tables come from the general path, so both agree to rounding by construction.
 
-use super::lagrange::{self, Quadrature};
+use super::lagrange::{self, POINTS, Quadrature};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
 
@@ -14,7 +14,7 @@ const ODD: usize = 4;
 /// Contribution of each sample of a window to each moment, in a run of 1s between equal spacings.
 fn response(window: usize, place: usize, increments: bool) -> (Vec<Moments<1>>, f64) {
     let mut noise_gain = 0.0;
-    let inner = lagrange::inner(window, place, increments);
+    let inner = [lagrange::inner(window, place, increments)];
     let rows = (0..window)
         .map(|i| {
             let mut unit = vec![Triple::ZERO; window];
@@ -23,22 +23,22 @@ fn response(window: usize, place: usize, increments: bool) -> (Vec<Moments<1>>, 
             let at = |i: usize, end: usize| Lanes([2.0 * i as f64 - 2.0 * end as f64 + 1.0]);
             let (m, gain) = if increments {
                 let x: Vec<Lanes<1>> = (0..=window).map(|i| at(i, place + 1)).collect();
-                lagrange::from_increments(
+                lagrange::from_increments::<1, POINTS>(
                     &x,
                     &unit,
                     place,
-                    inner.clone(),
+                    &inner,
                     &Quadrature::new(window + 1),
                 )
             } else {
                 let x: Vec<Lanes<1>> = (0..window).map(|i| at(i, place)).collect();
                 let (one, zero) = (Lanes([1.0]), Triple::ZERO);
-                lagrange::from_rates(
+                lagrange::from_rates::<1, POINTS>(
                     &x,
                     &mut unit,
                     zero,
                     one,
-                    inner.clone(),
+                    &inner,
                     &Quadrature::new(window),
                 )
             };
@@ -65,8 +65,6 @@ fn moments<const N: usize>(live: usize, [x, y, z]: [Axis<N>; 3]) -> Moments<N> {
 /// Coefficients of one pair of samples, symmetric about the interval.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
-    left: usize,
-    right: usize,
     even: [f64; EVEN],
     odd: [f64; ODD],
     outer: f64,
@@ -81,6 +79,7 @@ pub(crate) struct Centred {
     left: usize,
     right: usize,
     inner_odd: [f64; ODD],
+    /// The others, outwards.
     pairs: Vec<Pair>,
 }
 
@@ -107,8 +106,6 @@ impl Centred {
             inner_odd: odd(right),
             pairs: (1..=left)
                 .map(|k| Pair {
-                    left: left - k,
-                    right: right + k,
                     even: even(right + k),
                     odd: odd(right + k),
                     outer: rows[right + k].outer.x.0[0],
@@ -120,30 +117,31 @@ impl Centred {
     /// Moments of N neighbouring intervals: `x`, `y`, `z` begin with the first one's window and hold
     /// `window + N - 1` samples. For rates times `h`; increments take `h = 1`.
     #[inline(always)]
-    pub(crate) fn moments<const N: usize>(
-        &self,
-        x: &[f64],
-        y: &[f64],
-        z: &[f64],
-        h: Lanes<N>,
-    ) -> Moments<N> {
-        moments(self.live, [x, y, z].map(|v| self.axis(v, h)))
+    pub(crate) fn moments<const N: usize>(&self, xyz: [&[f64]; 3], h: Lanes<N>) -> Moments<N> {
+        match self.increments {
+            true => moments(self.live, xyz.map(|v| self.axis::<N, true>(v, h))),
+            false => moments(self.live, xyz.map(|v| self.axis::<N, false>(v, h))),
+        }
     }
 
     #[inline(always)]
-    fn axis<const N: usize>(&self, v: &[f64], h: Lanes<N>) -> Axis<N> {
-        let at = |i: usize| -> Lanes<N> {
-            let v = &v[i..i + N];
+    fn axis<const N: usize, const INCREMENTS: bool>(&self, v: &[f64], h: Lanes<N>) -> Axis<N> {
+        let at = |v: &[f64]| -> Lanes<N> {
+            let v = &v[..N];
             Lanes(std::array::from_fn(|k| v[k]))
         };
-        let (l, r) = (at(self.left), at(self.right));
+        let (l, r) = (at(&v[self.left..]), at(&v[self.right..]));
         let inner = l + r;
         let slope = r - l;
+        // The pairs outwards: each begins one further to the left, and to the right.
+        let lefts = v[..self.left + N - 1].windows(N).rev();
+        let rights = v[self.right + 1..].windows(N);
+        let pairs = || self.pairs.iter().zip(lefts.clone().zip(rights.clone()));
         let mut even = [Lanes::<N>::ZERO; EVEN];
         let mut outer = Lanes::<N>::ZERO;
-        for pair in &self.pairs {
-            let sum = (at(pair.left) + at(pair.right)) - inner;
-            if !self.increments {
+        for (pair, (left, right)) in pairs() {
+            let sum = (at(left) + at(right)) - inner;
+            if !INCREMENTS {
                 outer = outer + sum * pair.outer;
             }
             for k in 0..EVEN {
@@ -151,9 +149,9 @@ impl Centred {
             }
         }
         let mut odd = self.inner_odd.map(|c| slope * c);
-        for pair in &self.pairs {
-            let difference = at(pair.right) - at(pair.left);
-            if self.increments {
+        for (pair, (left, right)) in pairs() {
+            let difference = at(right) - at(left);
+            if INCREMENTS {
                 outer = outer + difference * pair.outer;
             }
             for k in 0..ODD {
@@ -206,14 +204,8 @@ impl Skewed {
 
     /// Same as [`Centred::moments`].
     #[inline(always)]
-    pub(crate) fn moments<const N: usize>(
-        &self,
-        x: &[f64],
-        y: &[f64],
-        z: &[f64],
-        h: Lanes<N>,
-    ) -> Moments<N> {
-        moments(self.live, [x, y, z].map(|v| self.axis(v, h)))
+    pub(crate) fn moments<const N: usize>(&self, xyz: [&[f64]; 3], h: Lanes<N>) -> Moments<N> {
+        moments(self.live, xyz.map(|v| self.axis(v, h)))
     }
 
     #[inline(always)]

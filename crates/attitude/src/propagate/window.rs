@@ -249,17 +249,12 @@ impl WindowKernel {
             let first = (k + self.look_ahead + 1).wrapping_sub(self.window);
             if n == GROUP {
                 self.group::<GROUP>(track, k, first, path, steps);
-            } else {
+            } else if slides {
                 for i in 0..n {
-                    match path {
-                        Path::Careful => steps.push(self.careful(track, k)),
-                        Path::Newest => {
-                            let first = track.len() - self.window;
-                            self.group::<1>(track, k, first, Path::Uniform, steps);
-                        }
-                        _ => self.group::<1>(track, k + i, first + i, path, steps),
-                    }
+                    self.group::<1>(track, k + i, first + i, path, steps);
                 }
+            } else {
+                n = self.newest(track, k, last, path, steps);
             }
             k += n;
         }
@@ -300,21 +295,32 @@ impl WindowKernel {
         path: Path,
         steps: &mut Vec<Step>,
     ) {
-        let mut loud = [false; N];
-        let moments = if path == Path::Uniform {
-            self.tabulated::<N>(track, k, first)
-        } else {
-            None
+        let table = match path {
+            Path::Uniform => self.table(k - first),
+            _ => None,
         };
-        let moments = moments.unwrap_or_else(|| {
-            let (moments, gain) = self.interpolate::<N>(track, k, first, self.window);
-            loud = gain.0.map(|gain| gain > self.loud || gain.is_nan());
-            moments
-        });
-        let turn = magnus::turn(&moments, self.order);
+        if let Some(table) = table {
+            let moments = self.tabulated::<N>(&table, track, k, first);
+            return self.push(track, k, (&moments, [false; N]), steps);
+        }
+        let (moments, gain) = self.interpolate::<N, 1>(track, k, first, self.window);
+        let loud = gain.0.map(|gain| gain > self.loud || gain.is_nan());
+        self.push(track, k, (&moments, loud), steps);
+    }
+
+    /// Appends the steps of these moments, of intervals k to k + N - 1; those of a window too loud carefully.
+    #[inline(never)]
+    fn push<const N: usize>(
+        &self,
+        track: &Track,
+        k: usize,
+        (moments, loud): (&Moments<N>, [bool; N]),
+        steps: &mut Vec<Step>,
+    ) {
+        let turn = magnus::turn(moments, self.order);
         // |v| = sin(a/2): the angle without trigonometry while it is small.
         let angle = small_angle(&turn, moments.b[0].size());
-        let outer = self.outer(&moments);
+        let outer = self.outer(moments);
         for i in 0..N {
             let ok = angle.0[i] >= 0.0 && !loud[i];
             if ok {
@@ -335,6 +341,62 @@ impl WindowKernel {
         }
     }
 
+    /// Appends interval k, and with it the next where that can be integrated beside it: the newest intervals of a run, of
+    /// which not all look-ahead is there, have one window. How many they are.
+    fn newest(
+        &self,
+        track: &Track,
+        k: usize,
+        last: usize,
+        path: Path,
+        steps: &mut Vec<Step>,
+    ) -> usize {
+        let is_pair = k < last && self.is_newest(track, k) && self.is_newest(track, k + 1);
+        let first = track.len().saturating_sub(self.window);
+        if path == Path::Newest {
+            let tables = || self.table(k - first).zip(self.table(k + 1 - first));
+            if is_pair && let Some((left, right)) = tables() {
+                let left = self.tabulated::<1>(&left, track, k, first);
+                let right = self.tabulated::<1>(&right, track, k + 1, first);
+                self.push(track, k, (&left.beside(&right), [false; 2]), steps);
+                return 2;
+            }
+            self.group::<1>(track, k, first, Path::Uniform, steps);
+        } else if is_pair && !self.increments {
+            let (moments, gain) = self.interpolate::<2, 0>(track, k, first, self.window);
+            let is_quiet = |lane: usize| {
+                let table = self.provisional_gain(k + lane - first);
+                gain.0[lane] <= self.loud.max(1.5 * table.unwrap_or(0.0))
+            };
+            if !is_quiet(0) || !is_quiet(1) {
+                steps.push(self.careful(track, k));
+                return 1;
+            }
+            let (turn, outer) = (magnus::turn(&moments, self.order), self.outer(&moments));
+            steps.extend([0, 1].map(|i| {
+                let delta = moments.b[0].lane(i).norm();
+                let step = Step::new(turn.lane(i), delta, Note::Ordinary);
+                step.with_outer(outer.lane(i))
+            }));
+            return 2;
+        } else {
+            steps.push(self.careful(track, k));
+        }
+        1
+    }
+
+    /// Whether interval k is integrated, provisionally, from the newest window of its run.
+    fn is_newest(&self, track: &Track, k: usize) -> bool {
+        let first = track.len().saturating_sub(self.window);
+        let is_whole = track.len() >= self.window + track.first();
+        is_whole
+            && self.look_ahead > 0
+            && k + self.look_ahead >= track.len()
+            && !track.bridged[k]
+            && track.is_joined(first, self.window)
+            && self.provisional_gain(k - first).is_some()
+    }
+
     /// Change of the turn by the outermost samples, rad, in the axes at its end: to first order
     /// in the change and in half the turn.
     #[inline(always)]
@@ -348,47 +410,70 @@ impl WindowKernel {
         changed + changed.cross(moments.b[0]) * 0.5
     }
 
-    /// Moments of N neighbouring intervals from equally spaced windows, the first beginning at `first`;
-    /// `None` where there is no table.
+    /// The table of equally spaced windows in which the interval ends at `place`; `None` where there is none.
+    fn table(&self, place: usize) -> Option<Table<'_>> {
+        match &self.centred {
+            Some(centred) if place == self.nominal() => Some(Table::Centred(centred)),
+            _ => self.skewed.get(place)?.as_ref().map(Table::Skewed),
+        }
+    }
+
+    /// Moments of N neighbouring intervals from equally spaced windows, the first beginning at `first`.
     #[inline(always)]
     fn tabulated<const N: usize>(
         &self,
+        table: &Table<'_>,
         track: &Track,
         k: usize,
         first: usize,
-    ) -> Option<Moments<N>> {
+    ) -> Moments<N> {
         let h = if self.increments {
             Lanes::splat(1.0)
         } else {
             Lanes(std::array::from_fn(|i| track.step(k + i)))
         };
         let end = first + self.window + N - 1;
-        let (x, y, z) = (
+        let xyz = [
             &track.x[first..end],
             &track.y[first..end],
             &track.z[first..end],
-        );
-        let place = k - first;
-        if let (Some(centred), true) = (&self.centred, place == self.nominal()) {
-            return Some(centred.moments(x, y, z, h));
+        ];
+        match table {
+            Table::Centred(centred) => centred.moments(xyz, h),
+            Table::Skewed(skewed) => skewed.moments(xyz, h),
         }
-        Some(self.skewed[place].as_ref()?.moments(x, y, z, h))
     }
 
     /// Moments of N neighbouring intervals from windows of `window` elements, the first beginning at
-    /// `first`, and their noise gain.
-    #[inline(always)]
-    fn interpolate<const N: usize>(
+    /// `first` and each by STEP behind the one before, and their noise gain.
+    fn interpolate<const N: usize, const STEP: usize>(
         &self,
         track: &Track,
         k: usize,
         first: usize,
         window: usize,
     ) -> (Moments<N>, Lanes<N>) {
-        let mut x = [Lanes::<N>::ZERO; POINTS];
-        let mut values = [Triple::<N>::ZERO; POINTS];
-        for i in 0..window {
-            values[i] = track.values(first + i);
+        // Arrays no longer than need be: to clear them is a good part of a short window's cost.
+        match window + usize::from(self.increments) {
+            0..=8 => self.interpolate_in::<N, STEP, 8>(track, k, first, window),
+            9..=16 => self.interpolate_in::<N, STEP, 16>(track, k, first, window),
+            _ => self.interpolate_in::<N, STEP, POINTS>(track, k, first, window),
+        }
+    }
+
+    /// Same as [`interpolate`](Self::interpolate), through at most P points.
+    #[inline(always)]
+    fn interpolate_in<const N: usize, const STEP: usize, const P: usize>(
+        &self,
+        track: &Track,
+        k: usize,
+        first: usize,
+        window: usize,
+    ) -> (Moments<N>, Lanes<N>) {
+        let mut x = [Lanes::<N>::ZERO; P];
+        let mut values = [Triple::<N>::ZERO; P];
+        for (i, value) in values[..window].iter_mut().enumerate() {
+            *value = track.values::<N, STEP>(first + i);
         }
         let ends: [(i64, i64); N] = std::array::from_fn(|lane| {
             let k = k + lane;
@@ -403,43 +488,45 @@ impl WindowKernel {
         let length: [i64; N] = ends.map(|(a, b)| b.saturating_sub(a));
         let scale = Lanes(length.map(|h| h as f64)).recip();
         let coordinate = |stamps: &[i64]| {
-            let stamps = &stamps[..N];
+            let stamps = &stamps[..1 + STEP * (N - 1)];
             let twice: [f64; N] = std::array::from_fn(|i| {
                 // Whole nanoseconds, exact in f64 up to 104 days, subtracted before anything is rounded.
                 let (a, b) = ends[i];
-                stamps[i].saturating_sub(a) as f64 + stamps[i].saturating_sub(b) as f64
+                let stamp = stamps[STEP * i];
+                stamp.saturating_sub(a) as f64 + stamp.saturating_sub(b) as f64
             });
             Lanes(twice) * scale
         };
+        let place: [usize; N] = std::array::from_fn(|lane| k + lane - (first + STEP * lane));
+        let inner = place.map(|place| lagrange::inner(window, place, self.increments));
         if self.increments {
             x[0] = coordinate(&track.start[first..]);
             for i in 0..window {
                 x[i + 1] = coordinate(&track.stamp[first + i..]);
             }
-            lagrange::from_increments(
-                &x[..=window],
-                &values[..window],
-                k - first,
-                lagrange::inner(window, k - first, true),
-                &self.quadratures[window + 1],
-            )
+            let (x, values) = (&x[..=window], &values[..window]);
+            let quadrature = &self.quadratures[window + 1];
+            lagrange::from_increments::<N, P>(x, values, place[0], &inner, quadrature)
         } else {
             for i in 0..window {
                 x[i] = coordinate(&track.stamp[first + i..]);
             }
-            let inner = k - first;
-            let reference = (values[inner - 1] + values[inner]) * 0.5;
+            let reference = Triple::of_lanes(|lane| {
+                let [before, at] = [place[lane] - 1, place[lane]];
+                (values[before].lane(lane) + values[at].lane(lane)) * 0.5
+            });
             let h = Lanes(length.map(secs));
-            lagrange::from_rates(
-                &x[..window],
-                &mut values[..window],
-                reference,
-                h,
-                lagrange::inner(window, inner, false),
-                &self.quadratures[window],
-            )
+            let (x, values) = (&x[..window], &mut values[..window]);
+            let quadrature = &self.quadratures[window];
+            lagrange::from_rates::<N, P>(x, values, reference, h, &inner, quadrature)
         }
     }
+}
+
+/// Table of the moments of one equally spaced window.
+enum Table<'t> {
+    Centred(&'t Centred),
+    Skewed(&'t Skewed),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

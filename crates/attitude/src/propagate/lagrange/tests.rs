@@ -4,6 +4,11 @@ use super::*;
 use crate::propagate::shared_data;
 use crate::propagate::uniform::{Centred, Skewed};
 
+/// Range of all points, of the one lane.
+fn whole(points: usize) -> [Range<usize>; 1] {
+    std::array::from_fn(|_| 0..points)
+}
+
 fn vectors(value: &serde_json::Value) -> Vec<Triple<1>> {
     let rows = value.as_array().unwrap();
     rows.iter()
@@ -44,19 +49,20 @@ fn moments_equal_the_golden_ones() {
 
     let mut rates = vectors(&golden["w"])[..8].to_vec();
     let reference = (rates[3] + rates[4]) * 0.5;
-    let (found, _) = from_rates(
+    let (found, _) = from_rates::<1, POINTS>(
         &x[..8],
         &mut rates,
         reference,
         Lanes([h]),
-        0..8,
+        &whole(8),
         &Quadrature::new(8),
     );
     let expected = vectors(&golden["rates_p8_window_0_7_interval_3_4"]);
     assert_equal(&found, &expected, h);
 
     let increments = &vectors(&golden["dtheta"])[..7];
-    let (found, _) = from_increments(&x[..8], increments, 3, 0..8, &Quadrature::new(8));
+    let (found, _) =
+        from_increments::<1, POINTS>(&x[..8], increments, 3, &whole(8), &Quadrature::new(8));
     // Seven increments make a rate of degree six: what is left of b_7 is rounding.
     assert!(found.b[7].norm() < 1e-17, "b_7: {:e}", found.b[7].norm());
     let expected = vectors(&golden["incs_p7_window_0_6_interval_3_4"]);
@@ -83,12 +89,12 @@ fn a_polynomial_rate_gives_its_own_coefficients_from_any_stamps() {
         let mut rates: Vec<Triple<1>> = x.iter().map(|x| polynomial(points - 1, x.0[0])).collect();
         let size = rates.iter().map(|r| r.norm()).fold(0.0, f64::max);
         let quadrature = Quadrature::new(points);
-        let (m, _) = from_rates(
+        let (m, _) = from_rates::<1, POINTS>(
             &x,
             &mut rates,
             Triple::ZERO,
             Lanes([1.0]),
-            0..x.len(),
+            &whole(x.len()),
             &quadrature,
         );
         for j in 0..points {
@@ -107,12 +113,12 @@ fn a_constant_rate_has_no_other_moment_whatever_the_stamps() {
         .collect();
     let rate = Triple::new(125.66, -0.1, 3.3);
     let mut rates = vec![rate; 16];
-    let (m, _) = from_rates(
+    let (m, _) = from_rates::<1, POINTS>(
         &x,
         &mut rates,
         rate,
         Lanes([0.25]),
-        0..x.len(),
+        &whole(x.len()),
         &Quadrature::new(16),
     );
     assert_eq!(m.b[0], rate * 0.25);
@@ -140,19 +146,19 @@ fn tables_for_equal_spacings_equal_the_general_path() {
             let reference = (rates[place - 1] + rates[place]) * 0.5;
             let h = Lanes([0.01]);
             let quadrature = Quadrature::new(window);
-            let (general, gain) = from_rates(
+            let (general, gain) = from_rates::<1, POINTS>(
                 &x,
                 &mut rates,
                 reference,
                 h,
-                inner(window, place, false),
+                &[inner(window, place, false)],
                 &quadrature,
             );
             let skewed = Skewed::for_rates(window, place);
-            let mut tables = vec![skewed.moments(&ax, &ay, &az, h)];
+            let mut tables = vec![skewed.moments([&ax, &ay, &az], h)];
             assert_eq!(skewed.gain, gain.0[0]);
             if 2 * place == window {
-                tables.push(Centred::for_rates(window).moments(&ax, &ay, &az, h));
+                tables.push(Centred::for_rates(window).moments([&ax, &ay, &az], h));
             }
             for table in tables {
                 assert_eq!(table.live, general.live);
@@ -171,18 +177,18 @@ fn tables_for_equal_spacings_equal_the_general_path() {
             let x: Vec<Lanes<1>> = (0..=window)
                 .map(|i| Lanes([2.0 * i as f64 - 2.0 * own as f64 - 1.0]))
                 .collect();
-            let (general, gain) = from_increments(
+            let (general, gain) = from_increments::<1, POINTS>(
                 &x,
                 &all(window),
                 own,
-                inner(window, own, true),
+                &[inner(window, own, true)],
                 &Quadrature::new(window + 1),
             );
             let one = Lanes([1.0]);
             let skewed = Skewed::for_increments(window, own);
-            let mut tables = vec![skewed.moments(&ax, &ay, &az, one)];
+            let mut tables = vec![skewed.moments([&ax, &ay, &az], one)];
             if 2 * own + 1 == window {
-                tables.push(Centred::for_increments(window).moments(&ax, &ay, &az, one));
+                tables.push(Centred::for_increments(window).moments([&ax, &ay, &az], one));
             }
             for table in tables {
                 for j in 0..table.live {

@@ -10,8 +10,7 @@ use crate::plausible::{are_numbers, is_unit};
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::classical::LOOK_BACK;
 use crate::propagate::covariance;
-use crate::quaternion::BodyRate;
-use crate::record::{Join, Measured, Nanos, RateSample, Status};
+use crate::record::{Nanos, Status};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
@@ -81,16 +80,17 @@ impl Propagator {
             return None;
         }
         let last = self.output.state.last;
-        let row = |waiting: &PendingSample| {
-            let sample = &waiting.sample;
+        let row = |sample: &PendingSample| {
             let accel = sample.accel.map(|force| (*force.as_vector()).into());
             let age = last.saturating_sub(sample.stamp.0);
-            (age, accel, sample.status.0, sample.log.0, waiting.turns)
+            (age, accel, sample.status.0, sample.log.0, sample.turns)
         };
         let track = &self.track;
         let from = self.next.saturating_sub(self.looked_back());
+        let mut state = self.output.state;
+        state.rates.sample = self.last_rate();
         Some(Memory {
-            state: self.output.state,
+            state,
             attitude: self.output.attitude,
             covariance: self.output.covariance.state(),
             before: (track.base + from) as u64,
@@ -179,18 +179,11 @@ impl Propagator {
 }
 
 fn waiting(last: i64, &(age, accel, status, log, turns): &Row) -> PendingSample {
-    let stamp = Nanos(last.saturating_sub(age));
     PendingSample {
-        // Its value is in the track.
-        sample: RateSample {
-            stamp,
-            start: stamp,
-            gyro: Measured::Rate(BodyRate::ZERO),
-            accel: accel.map(|force| In::assume(Vector3::from(force))),
-            join: Join::Continuous,
-            status: Status(status),
-            log: Nanos(log),
-        },
+        stamp: Nanos(last.saturating_sub(age)),
+        log: Nanos(log),
+        accel: accel.map(|force| In::assume(Vector3::from(force))),
+        status: Status(status),
         turns,
     }
 }

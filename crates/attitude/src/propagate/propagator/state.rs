@@ -1,6 +1,7 @@
 //! Steps and waiting samples -> outputs. Pure.
 
 use super::world::TurningWorld;
+use crate::frames::{Body, In};
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::columns::{Track, secs};
 use crate::propagate::covariance::Covariance;
@@ -12,15 +13,31 @@ use crate::propagate::settings::Settings;
 use crate::propagate::turn::Turn;
 use crate::propagate::window::{Note, Step};
 use crate::quaternion::{BodyRate, Quaternion};
-use crate::record::{AttitudeSample, RateSample, Status};
+use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, Status};
 use std::collections::VecDeque;
 
-/// A sample taken in and not yet output.
+/// Facts of a sample that its output will need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingSample {
-    pub(super) sample: RateSample,
+    pub(super) stamp: Nanos,
+    pub(super) log: Nanos,
+    pub(super) accel: Option<In<Body>>,
+    pub(super) status: Status,
     /// Whether it advances in time and so ends an interval.
     pub(super) turns: bool,
+}
+
+impl PendingSample {
+    #[inline(always)]
+    pub(super) fn of(sample: &RateSample, status: Status, turns: bool) -> PendingSample {
+        PendingSample {
+            stamp: sample.stamp,
+            log: sample.log,
+            accel: sample.accel,
+            status,
+            turns,
+        }
+    }
 }
 
 /// State of a propagator beside its samples, attitude and covariance: what is saved, as it is. A new field is added
@@ -204,7 +221,7 @@ impl Output {
         k: usize,
         out: &mut Vec<AttitudeSample>,
     ) {
-        if let Some(PendingSample { sample, .. }) = queue.pop_front() {
+        if let Some(sample) = queue.pop_front() {
             self.output_at(&sample, Some(track.rate(k)), out);
         }
         self.flush_stalled(queue, out);
@@ -217,12 +234,9 @@ impl Output {
         queue: &mut VecDeque<PendingSample>,
         out: &mut Vec<AttitudeSample>,
     ) {
-        while let Some(&PendingSample {
-            sample,
-            turns: false,
-        }) = queue.front()
+        while queue.front().is_some_and(|sample| !sample.turns)
+            && let Some(sample) = queue.pop_front()
         {
-            queue.pop_front();
             self.output_at(&sample, None, out);
         }
     }
@@ -230,8 +244,21 @@ impl Output {
     #[inline(always)]
     pub(super) fn output_at(
         &mut self,
-        sample: &RateSample,
+        sample: &PendingSample,
         rate: Option<Triple<1>>,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        let covariance = self.covariance.attitude();
+        self.output_known(sample, rate, covariance, out);
+    }
+
+    /// Outputs a sample whose attitude is known so well.
+    #[inline(always)]
+    pub(super) fn output_known(
+        &mut self,
+        sample: &PendingSample,
+        rate: Option<Triple<1>>,
+        covariance: AttitudeCovariance,
         out: &mut Vec<AttitudeSample>,
     ) {
         if let Some(rate) = rate {
@@ -243,7 +270,7 @@ impl Output {
             q_nb: Quaternion::assume_unit(q_nb),
             rate: BodyRate(self.state.rates.output.into()),
             accel: sample.accel,
-            covariance: self.covariance.attitude(),
+            covariance,
             status: sample.status.with(self.state.added),
             reset_count: self.state.resets,
             log: sample.log,

@@ -320,13 +320,13 @@ impl WindowKernel {
         if table.is_some()
             && size == self.window
             && track.is_uniform(first, size)
-            && let Some(moments) = self.tabulated::<1>(track, k, first)
+            && let Some(table) = self.table(k - first)
         {
             // The method's own window on perfect stamps, one-sided because it was asked to be.
-            return settled(moments, 0.0);
+            return settled(self.tabulated::<1>(&table, track, k, first), 0.0);
         }
         if track.is_joined(first, size) {
-            let (moments, gain) = self.interpolate::<1>(track, k, first, size);
+            let (moments, gain) = self.interpolate::<1, 1>(track, k, first, size);
             return settled(moments, gain.0[0]);
         }
         let range = (track.start[k], track.stamp[k]);
@@ -343,7 +343,7 @@ impl WindowKernel {
             let quadrature = &self.quadratures[size];
             collocation::moments(track, first, size, self.gap(track, k), quadrature)
         } else {
-            self.interpolate::<1>(track, k, first, size).0
+            self.interpolate::<1, 1>(track, k, first, size).0
         }
     }
 }
