@@ -77,6 +77,9 @@ pub fn estimate<'py>(
     let (columns, done) = py.detach(|| {
         let mut signals = Signals::new();
         let mut columns = Columns::with_room(samples.len());
+        if plan.noise.is_none() {
+            columns = columns.without_covariance();
+        }
         let done = run(&plan, samples.part(0, samples.len()), |attitudes| {
             columns.extend(attitudes);
             signals.look()

@@ -16,8 +16,8 @@ pub struct Columns {
     pub q: Vec<f64>,
     /// Rate about body axes, rad/s.
     pub rate: Vec<f64>,
-    /// Upper triangle of the covariance, body axes, rad^2: xx, xy, xz, yy, yz, zz.
-    pub cov: Vec<f64>,
+    /// Upper triangle of the covariance, body axes, rad^2: xx, xy, xz, yy, yz, zz; `None` where none is carried.
+    pub cov: Option<Vec<f64>>,
     /// Bits of the status.
     pub status: Vec<u16>,
     /// Resets and holds so far.
@@ -31,22 +31,29 @@ impl Columns {
             t: Vec::with_capacity(n),
             q: Vec::with_capacity(4 * n),
             rate: Vec::with_capacity(3 * n),
-            cov: Vec::with_capacity(6 * n),
+            cov: Some(Vec::with_capacity(6 * n)),
             status: Vec::with_capacity(n),
             reset: Vec::with_capacity(n),
         }
     }
 
+    /// The same without a covariance.
+    pub fn without_covariance(self) -> Columns {
+        Columns { cov: None, ..self }
+    }
+
     /// Appends attitudes.
     pub fn extend(&mut self, samples: &[AttitudeSample]) {
-        for sample in samples {
-            self.t.push(sample.stamp.0);
-            self.q.extend_from_slice(&sample.q_nb.wxyz());
-            self.rate.extend_from_slice(sample.rate.0.as_slice());
-            self.cov.extend_from_slice(&sample.covariance.upper());
-            self.status.push(sample.status.0);
-            self.reset.push(sample.reset_count);
+        let all = || samples.iter();
+        self.t.extend(all().map(|sample| sample.stamp.0));
+        self.q.extend(all().flat_map(|sample| sample.q_nb.wxyz()));
+        let rates = all().map(|sample| <[f64; 3]>::from(sample.rate.0));
+        self.rate.extend(rates.flatten());
+        if let Some(cov) = &mut self.cov {
+            cov.extend(all().flat_map(|sample| sample.covariance.upper()));
         }
+        self.status.extend(all().map(|sample| sample.status.0));
+        self.reset.extend(all().map(|sample| sample.reset_count));
     }
 
     /// Converts to numpy arrays; the memory is theirs from here on.
@@ -55,7 +62,9 @@ impl Columns {
         dict.set_item("t", self.t.into_pyarray(py))?;
         dict.set_item("q", rows(py, self.q, 4)?)?;
         dict.set_item("rate", rows(py, self.rate, 3)?)?;
-        dict.set_item("cov", rows(py, self.cov, 6)?)?;
+        if let Some(cov) = self.cov {
+            dict.set_item("cov", rows(py, cov, 6)?)?;
+        }
         dict.set_item("status", self.status.into_pyarray(py))?;
         dict.set_item("reset", self.reset.into_pyarray(py))?;
         Ok(dict)

@@ -63,7 +63,8 @@ class Attitude:
         self.t = columns["t"]
         self.q = columns["q"]
         self.rate = columns["rate"]
-        self._cov: npt.NDArray[np.float64] = columns["cov"]
+        # None where no covariance is carried.
+        self._cov: Optional[npt.NDArray[np.float64]] = columns.get("cov")
         self.status = columns["status"]
         self.reset = columns["reset"]
         self.summary = summary
@@ -86,12 +87,17 @@ class Attitude:
     @property
     def sigma(self) -> npt.NDArray[np.float64]:
         """(n, 3): one standard deviation about each body axis, rad; NaN where it is not known."""
-        return np.sqrt(self._cov[:, [0, 3, 5]])
+        return np.sqrt(self._upper[:, [0, 3, 5]])
 
     @property
     def covariance(self) -> npt.NDArray[np.float64]:
         """(n, 3, 3): of the error as a rotation vector in body axes, rad^2."""
-        return self._cov[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+        return self._upper[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+
+    @property
+    def _upper(self) -> npt.NDArray[np.float64]:
+        """(n, 6): the upper triangle, NaN where it is not known."""
+        return np.full((len(self), 6), np.nan) if self._cov is None else self._cov
 
     @property
     def world(self) -> str:
@@ -279,7 +285,9 @@ class Attitude:
         """Some of the attitudes, by a slice (no copy), a mask or indices; the summary stays that of the run."""
         if isinstance(part, (int, np.integer)):
             raise TypeError("a slice, a mask or indices; att.q[i] is one quaternion")
-        columns: dict[str, Any] = {"t": self.t[part], "q": self.q[part], "rate": self.rate[part], "cov": self._cov[part]}
+        columns: dict[str, Any] = {"t": self.t[part], "q": self.q[part], "rate": self.rate[part]}
+        if self._cov is not None:
+            columns["cov"] = self._cov[part]
         columns.update(status=self.status[part], reset=self.reset[part])
         return Attitude(columns, self.summary)
 

@@ -32,7 +32,7 @@ def _track(name: str, track: Track) -> tuple[_inputs.Nanos, _inputs.Floats]:
 
 def _covariance(track: Track) -> Optional[npt.NDArray[np.float64]]:
     """Covariances of a track that states all of them."""
-    if isinstance(track, Attitude) and np.isfinite(track._cov).all():
+    if isinstance(track, Attitude) and track._cov is not None and np.isfinite(track._cov).all():
         return np.ascontiguousarray(track._cov)
     return None
 

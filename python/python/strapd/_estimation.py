@@ -154,10 +154,18 @@ def integrate(
     dt: Optional[npt.ArrayLike] = None,
     orientation: Optional[npt.ArrayLike] = None,
     strict: bool = False,
+    covariance: bool = True,
     **settings: Unpack[Settings],
 ) -> Attitude:
-    """Attitude from the gyro alone, relative to the first sample: :func:`estimate` with ``aid="none"``."""
+    """Attitude from the gyro alone, relative to the first sample: :func:`estimate` with ``aid="none"``.
+
+    :param covariance: ``False`` carries none, which is faster: the attitude has the same bits, its ``sigma`` is NaN.
+    """
     given: dict[str, Any] = {"aid": "none", "kind": kind, "method": method, **settings}
+    if not covariance:
+        if given.get("noise") is not None:
+            raise ValueError("noise: of no use with covariance=False\n  help: leave one of the two out")
+        given["noise"] = "none"
     return _run(gyr, t, rate_hz, (None, None, orientation), dt, strict, given)
 
 

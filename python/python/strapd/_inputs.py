@@ -62,6 +62,8 @@ def counted(rate_hz: float, first: int, n: int) -> Nanos:
     if (first + n) * (whole + 1) >= 2**63:
         raise ValueError(f"rate_hz: {n} samples at {rate_hz} Hz last longer than 292 years")
     i = np.arange(first, first + n, dtype=np.int64)
+    if period == whole:
+        return i * whole
     nanos: Nanos = i * whole + np.floor(i * (period - whole) + 0.5).astype(np.int64)
     return nanos
 

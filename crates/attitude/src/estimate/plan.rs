@@ -13,8 +13,8 @@ use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
 use crate::setting::{
     ACCEL_SCALE, AID, BIAS, CALIBRATION, Choice, DECLINATION, EARTH_RATE, INIT, MAG_AXES,
-    MAG_HARD_IRON, MAG_MOUNT, METHOD, RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME,
-    UNDO_TRUNCATION, WORLD,
+    MAG_HARD_IRON, MAG_MOUNT, METHOD, NOISE, RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH,
+    TIME, UNDO_TRUNCATION, WORLD,
 };
 use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
@@ -227,6 +227,7 @@ impl EstimationSettings {
                     .help(format!("{RATE_HZ} HZ")),
             );
         }
+        self.check_noise()?;
         if let Truncation::Steps(step) = self.truncation
             && !(step > 0.0 && step < 1.0)
         {
@@ -284,6 +285,16 @@ impl EstimationSettings {
     }
 
     /// A field needs stamps to find its gyro sample by, and a declination a field.
+    fn check_noise(&self) -> Result<(), Diagnostic> {
+        if self.noise.is_none() && (self.aid != Aid::None || self.smooth) {
+            return Err(Diagnostic::new(format!(
+                "{NOISE} none: what corrects the attitude weighs it by its noise"
+            ))
+            .help(format!("{AID} none, or a class of sensors")));
+        }
+        Ok(())
+    }
+
     fn check_field(&self) -> Result<(), Diagnostic> {
         let has_field = self.aid == Aid::GravityAndField;
         if self.declination != 0.0 && !has_field {
@@ -497,6 +508,9 @@ const LEFT: f64 = 0.03;
 /// nobody calibrated the sensor.
 pub const CLASS_BY_DATA: &str = "auto";
 
+/// Name of noise of which nothing is stated.
+pub(super) const NO_NOISE: &str = "none";
+
 impl Noise {
     /// Noise of the default class, which the data of a file may replace.
     #[must_use]
@@ -505,6 +519,30 @@ impl Noise {
             name: CLASS_BY_DATA.to_owned(),
             ..Noise::preset(&NOISE_PRESETS[0])
         }
+    }
+
+    /// Noise of which nothing is stated: no covariance is carried.
+    #[must_use]
+    pub fn none() -> Noise {
+        Noise {
+            name: NO_NOISE.to_owned(),
+            arw: [0.0; 3],
+            bias_instability: [0.0; 3],
+            rrw: [0.0; 3],
+            turn_on_bias: [0.0; 3],
+            initial: [0.0; 3],
+            scale: 0.0,
+            misalignment: 0.0,
+            tilt: 0.0,
+            delay: 0.0,
+            sensitivity: 0.0,
+        }
+    }
+
+    /// Whether nothing is stated of it.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.name == NO_NOISE
     }
 
     /// Whether the data of a file may replace it.
@@ -599,6 +637,9 @@ impl Noise {
     /// Noise for the propagator, when `bias` (rad/s) is not known of the bias.
     #[must_use]
     pub fn with_bias(&self, bias: [f64; 3]) -> propagate::Noise {
+        if self.is_none() {
+            return propagate::Noise::default();
+        }
         propagate::Noise {
             initial: self.initial,
             arw: self.arw,

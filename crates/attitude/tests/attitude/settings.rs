@@ -124,8 +124,9 @@ fn words_are_the_names_of_what_they_set_and_none_is_left_out() {
     for class in &NOISE_PRESETS {
         assert_eq!(plan("noise", class.name).noise.name, class.name);
     }
-    // The last is told by the data.
-    assert_eq!(words("noise").count(), NOISE_PRESETS.len() + 1);
+    assert!(plan("noise", "none").noise.is_none());
+    // One more is told by the data.
+    assert_eq!(words("noise").count(), NOISE_PRESETS.len() + 2);
     assert_eq!(
         plan("noise", CLASS_BY_DATA).noise,
         EstimationSettings::default().noise
@@ -187,6 +188,7 @@ fn settings_that_belong_to_others_are_refused_without_them() {
             "the sample rate is needed too\n  help: rate_hz HZ",
         ),
         (&[("undo_truncation", "on=0")], "above 0 and below 1"),
+        (&[("aid", "gravity"), ("noise", "none")], "noise none:"),
     ] {
         let said = refused(given);
         assert!(said.contains(why), "{given:?}: {said}");

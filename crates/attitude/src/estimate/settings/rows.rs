@@ -7,7 +7,8 @@ use crate::condition::{
 use crate::diagnostic::Diagnostic;
 use crate::estimate::noise_presets::NOISE_PRESETS;
 use crate::estimate::plan::{
-    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, LONGEST_DELAY, Noise, Truncation,
+    Aid, Bias, CLASS_BY_DATA, EstimationSettings, Initial, LONGEST_DELAY, NO_NOISE, Noise,
+    Truncation,
 };
 use crate::frames::BodyAxes;
 use crate::propagate::{Method, Order};
@@ -469,7 +470,7 @@ pub static ROWS: [Row; 37] = [
     },
     Row {
         setting: NOISE,
-        meaning: "Class of the sensor: auto, consumer, uncalibrated, industrial, tactical, navigation, or a list",
+        meaning: "Class of the sensor: auto, consumer, uncalibrated, industrial, tactical, navigation, none, or a list",
         effect: "It says how sure the attitude is (sigma), and what the filter expects of the sensor. auto is consumer; of a file whose attitude gravity corrects, uncalibrated where its data clearly tell that nobody calibrated the sensor. A list is in the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw (deg/h/sqrt(h)), turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed ({bias}); initial is the uncertainty of the initial attitude. And one number each: scale-ppm and misalignment (deg), which grow with the angle of rotation, tilt (deg) of {init} gravity.",
         default: Default::Value(CLASS_BY_DATA),
         placeholder: "NOISE",
@@ -480,6 +481,7 @@ pub static ROWS: [Row; 37] = [
             word(NOISE_PRESETS[2].name, "A calibrated module, 2 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[2])),
             word(NOISE_PRESETS[3].name, "0.5 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[3])),
             word(NOISE_PRESETS[4].name, "0.01 deg/h", |p| p.noise = Noise::preset(&NOISE_PRESETS[4])),
+            word(NO_NOISE, "Nothing is stated, and no covariance carried (zeros): faster, of a gyro alone", |p| p.noise = Noise::none()),
         ],
         takes: Takes::Figures(|p, noise| p.noise = noise),
         ..ROW
