@@ -6,8 +6,6 @@
 //! Values that were rounded have bins of one width; values that were averaged or filtered after that have none:
 //! both are left as they are.
 
-use std::collections::BTreeMap;
-
 /// Steps looked for are smaller, rad/s (2 deg/s).
 const LARGEST_STEP: f64 = 0.034_906_585;
 /// And larger, rad/s.
@@ -74,18 +72,16 @@ fn step(rates: &[[f64; 3]]) -> Option<f64> {
     if differences.len() < FEWEST {
         return None;
     }
-    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut counts = vec![0_usize; (LARGEST_STEP / RESOLUTION) as usize + 2];
     for difference in &differences {
-        *counts
-            .entry((difference / RESOLUTION).round() as u32)
-            .or_default() += 1;
+        if let Some(count) = counts.get_mut((difference / RESOLUTION).round() as usize) {
+            *count += 1;
+        }
     }
     let often = 20.max(differences.len() / 500);
-    let smallest = (SMALLEST_STEP / RESOLUTION).round() as u32;
-    let (first, _) = counts
-        .range(smallest..)
-        .find(|(_, count)| **count >= often)?;
-    let mut step = f64::from(*first) * RESOLUTION;
+    let smallest = (SMALLEST_STEP / RESOLUTION).round() as usize;
+    let first = (smallest..counts.len()).find(|at| counts.get(*at) >= Some(&often))?;
+    let mut step = first as f64 * RESOLUTION;
     for _ in 0..2 {
         let (mut near, mut on, mut product, mut square) = (0, 0, 0.0, 0.0);
         for x in differences.iter().filter(|d| **d < 8.5 * step) {

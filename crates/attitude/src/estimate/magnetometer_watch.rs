@@ -80,27 +80,53 @@ impl MagnetometerWatch {
 
     /// Takes conditioned samples.
     pub(super) fn push(&mut self, samples: &[RateSample]) {
-        if !self.has_field && self.consistency.is_live() {
-            return;
+        if !self.has_field {
+            return self.wait(samples);
         }
         for sample in samples {
-            let held = self
-                .force
-                .filter(|(stamp, _)| (0..=HELD_NANOS).contains(&sample.stamp.since(*stamp)));
-            self.rates.push_back(RateSample {
-                accel: sample.accel.or(held.map(|(_, force)| force)),
-                ..*sample
-            });
+            self.rates.push_back(self.with_force(sample));
             while let Some(first) = self.rates.front().copied() {
-                let is_old = sample.stamp.since(first.stamp) >= LATER_NANOS;
-                if !is_old && self.rates.len() <= MOST_RATES {
+                if !is_over(self.rates.len(), sample.stamp, first.stamp) {
                     break;
                 }
                 self.rates.pop_front();
-                if self.has_field {
-                    self.look_at(&first);
-                }
+                self.look_at(&first);
             }
+        }
+    }
+
+    /// Keeps of samples, while no field has come, those that one still to come may belong to.
+    fn wait(&mut self, samples: &[RateSample]) {
+        if self.consistency.is_live() {
+            return;
+        }
+        let held = self.rates.len();
+        // Most of many samples are over before the last has come, and never kept.
+        let mut gone = 0;
+        for (n, sample) in samples.iter().enumerate() {
+            let first = |gone: usize| match gone.checked_sub(held) {
+                None => self.rates.get(gone),
+                Some(of_these) => samples.get(of_these).filter(|_| of_these <= n),
+            };
+            while first(gone).is_some_and(|s| is_over(held + n + 1 - gone, sample.stamp, s.stamp)) {
+                gone += 1;
+            }
+        }
+        self.rates.drain(..gone.min(held));
+        let kept = samples.get(gone.saturating_sub(held)..).unwrap_or_default();
+        for sample in kept {
+            self.rates.push_back(self.with_force(sample));
+        }
+    }
+
+    /// The sample, with the last force of its own where it has none and that still holds.
+    fn with_force(&self, sample: &RateSample) -> RateSample {
+        let held = self
+            .force
+            .filter(|(stamp, _)| (0..=HELD_NANOS).contains(&sample.stamp.since(*stamp)));
+        RateSample {
+            accel: sample.accel.or(held.map(|(_, force)| force)),
+            ..*sample
         }
     }
 
@@ -128,4 +154,9 @@ impl MagnetometerWatch {
     pub(super) fn consistency(&self) -> &FieldConsistency {
         &self.consistency
     }
+}
+
+/// Whether the `first` of so many samples has waited long enough for its field, at the stamp of the last.
+fn is_over(count: usize, last: Nanos, first: Nanos) -> bool {
+    last.since(first) >= LATER_NANOS || count > MOST_RATES
 }
