@@ -2,6 +2,7 @@
 //!
 //! Below the decoders, whose options hold it, and the tables, which are read by it.
 
+pub(crate) mod bits;
 mod cells;
 mod given;
 mod increments;

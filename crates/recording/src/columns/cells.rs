@@ -114,7 +114,7 @@ impl<'a> Iterator for Cells<'a> {
             self.rest = behind;
             return Some(Cow::Owned(cell));
         }
-        let end = text.iter().position(|b| *b == byte);
+        let end = memchr::memchr(byte, text);
         self.rest = end.and_then(|end| text.get(end + 1..));
         let cell = text.get(..end.unwrap_or(text.len())).unwrap_or_default();
         Some(Cow::Borrowed(cell))

@@ -3,6 +3,7 @@
 //! Apart from the roles of columns because it says nothing of what they mean: rows of another value are left out and
 //! counted.
 
+use super::bits;
 use super::cells::Delimiter;
 use crate::text::{named_few, printable};
 use std::collections::BTreeSet;
@@ -116,7 +117,8 @@ impl RowSelection {
             let Some(cell) = delimiter.cells(row).nth(of.place) else {
                 continue;
             };
-            let cell = String::from_utf8_lossy(cell.trim_ascii());
+            let cell = bits::spelled(cell.trim_ascii());
+            let cell = String::from_utf8_lossy(&cell);
             if !of.has(&cell) {
                 is_taken = false;
                 if of.others.len() < NAMED && !of.others.contains(cell.as_ref()) {

@@ -7,7 +7,7 @@ use super::column::{Column, is_comment};
 use super::layout;
 use super::own;
 use super::preamble;
-use crate::columns::Columns;
+use crate::columns::{Columns, bits};
 use crate::columns::{Delimiter, RowSelection};
 use crate::decode::{Class, Line, MAX_LINE, Undecodable, exact_name};
 use crate::text::without_mark;
@@ -315,7 +315,10 @@ impl Table {
         let place = self.columns.iter().position(is_step);
         let place = place.filter(|_| matches!(why, Undecodable::Cell { .. }));
         let cell = place.and_then(|place| self.delimiter.cells(row).nth(place));
-        let cell = cell.map(|cell| String::from_utf8_lossy(&cell).trim().replace(',', "."));
+        let cell = cell.map(|cell| {
+            let cell = bits::spelled(&cell);
+            String::from_utf8_lossy(&cell).trim().replace(',', ".")
+        });
         self.clock.pass(before, cell.as_deref());
     }
 
@@ -330,8 +333,9 @@ impl Table {
     fn explained(&mut self, row: &[u8], why: Undecodable) -> Undecodable {
         // In a header nothing is a number, which tells most rows at once.
         let is_data = |cell: Cow<'_, [u8]>| {
-            let text = std::str::from_utf8(cell.trim_ascii()).unwrap_or_default();
-            text.parse::<f64>().is_ok()
+            let cell = cell.trim_ascii();
+            let text = std::str::from_utf8(cell).unwrap_or_default();
+            bits::read(cell).is_some() || text.parse::<f64>().is_ok()
         };
         let is_header = self.whose == Whose::Others
             && !self.delimiter.cells(row).any(is_data)
@@ -529,6 +533,13 @@ impl Read {
         if cell.is_empty() {
             return Ok(());
         }
+        if let Some(value) = bits::read(cell) {
+            if let Some(place) = self.place_of(column) {
+                *place = Some(value);
+                return Ok(());
+            }
+            return self.take(column, &bits::spelled(cell), commas, clock);
+        }
         let mut pointed = [0; MOST_DIGITS];
         let cell = match commas && cell.contains(&b',') {
             true => with_point(cell, &mut pointed).ok_or("is no number")?,
@@ -536,13 +547,10 @@ impl Read {
         };
         let text = std::str::from_utf8(cell).map_err(|_| "is not UTF-8")?;
         let whole = || text.parse::<i64>().map_err(|_| "is no whole number");
-        let put = |place: Option<&mut Option<f64>>| {
-            let value = number(text)?;
-            if let Some(place) = place {
-                *place = Some(value);
-            }
-            Ok::<(), &'static str>(())
-        };
+        if let Some(place) = self.place_of(column) {
+            *place = Some(number(text)?);
+            return Ok(());
+        }
         match column {
             Column::Stamp if is_absent(text) => {}
             Column::Stamp => self.stamp = Some(clock.read(text)?),
@@ -561,14 +569,24 @@ impl Read {
                     None => text.to_owned(),
                 });
             }
-            Column::Gyro(axis) => put(self.gyro.get_mut(axis))?,
-            Column::Accel(axis) => put(self.accel.get_mut(axis))?,
-            Column::Mag(axis) => put(self.mag.get_mut(axis))?,
-            Column::Orientation(part) => put(self.orientation.get_mut(part))?,
-            Column::Turn(part) => put(self.turn.get_mut(part))?,
-            Column::Matrix(part) => put(self.matrix.get_mut(part))?,
+            // A number, which has a place.
+            _ => {}
         }
         Ok(())
+    }
+
+    /// Place of the number in a column, if the column holds plain numbers.
+    #[inline]
+    fn place_of(&mut self, column: Column) -> Option<&mut Option<f64>> {
+        match column {
+            Column::Gyro(axis) => self.gyro.get_mut(axis),
+            Column::Accel(axis) => self.accel.get_mut(axis),
+            Column::Mag(axis) => self.mag.get_mut(axis),
+            Column::Orientation(part) => self.orientation.get_mut(part),
+            Column::Turn(part) => self.turn.get_mut(part),
+            Column::Matrix(part) => self.matrix.get_mut(part),
+            _ => None,
+        }
     }
 }
 

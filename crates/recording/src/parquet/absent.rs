@@ -32,6 +32,10 @@ impl<S: Read + Seek> Rows<S> {
             "build it with that feature; or duckdb -c \"copy (select epoch_ns(stamp) as stamp_ns, * exclude stamp from 'FILE') to 'log.csv'\" makes a table that is read, `stamp` being its column of times",
         )))
     }
+
+    pub(crate) fn with_bits(self) -> Rows<S> {
+        match self.0 {}
+    }
 }
 
 impl<S> Read for Rows<S> {

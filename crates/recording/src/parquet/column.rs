@@ -74,11 +74,16 @@ impl Column {
         self.dictionary_size + of_page
     }
 
-    /// Writes the cell of the next row; what it says is why the row is lost.
+    /// Writes the cell of the next row, its numbers as `put` has them; what it says is why the row is lost.
     ///
     /// # Errors
     /// It cannot be written.
-    pub(super) fn write(&mut self, out: &mut Vec<u8>) -> io::Result<Option<Arc<str>>> {
+    #[inline]
+    pub(super) fn write(
+        &mut self,
+        out: &mut Vec<u8>,
+        put: fn(f64, &mut Vec<u8>),
+    ) -> io::Result<Option<Arc<str>>> {
         if self.page.row >= self.page.rows {
             return Ok(Some("the column has fewer values than rows".into()));
         }
@@ -101,8 +106,10 @@ impl Column {
                 (Some(v), _, _) => write!(out, "{v}")?,
                 (None, ..) => {}
             },
-            Some(Values::Float(all)) => put(out, all.get(n).map(|v| f64::from(*v)))?,
-            Some(Values::Double(all)) => put(out, all.get(n).copied())?,
+            Some(Values::Float(all)) => {
+                all.get(n).into_iter().for_each(|v| put(f64::from(*v), out))
+            }
+            Some(Values::Double(all)) => all.get(n).into_iter().for_each(|v| put(*v, out)),
             Some(Values::Text(all)) => quoted(out, all.get(n).map_or(&[][..], Vec::as_slice)),
             None => {}
         }
@@ -286,14 +293,6 @@ impl Column {
             (6 | 7, Stored::Bytes) => texts(rest.0, encoding == 7, n)?,
             (other, _) => return Err(format!("an encoding that is not read, {other}")),
         })
-    }
-}
-
-fn put(out: &mut Vec<u8>, value: Option<f64>) -> io::Result<()> {
-    match value {
-        // The fewest digits that are these bits.
-        Some(value) => write!(out, "{value:e}"),
-        None => Ok(()),
     }
 }
 

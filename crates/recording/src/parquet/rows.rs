@@ -7,10 +7,10 @@
 use super::MAGIC;
 use super::column::{Column, read_at};
 use super::footer::{Footer, Group, Leaf, Meaning, Stored};
-use crate::columns::{Columns, Meant, Name};
+use crate::columns::{Columns, Meant, Name, bits};
 use crate::delimited::{LOST, is_own_column};
 use std::fmt::{self, Write as _};
-use std::io::{self, Read, Seek};
+use std::io::{self, Read, Seek, Write as _};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 
@@ -21,6 +21,9 @@ const ROWS_A_BYTE: u64 = 256;
 const ROWS_OF_ANY: u64 = 1 << 20;
 /// Bytes of pages and dictionaries that are held at once, of all columns.
 const MOST_HELD: u64 = 512 << 20;
+/// Rows whose numbers are written with digits: those by which columns are judged. The bits of the others are handed on
+/// ([`bits`]).
+const SPELLED: u64 = 64;
 /// Bytes of text that are made at once.
 const AHEAD: usize = 1 << 16;
 
@@ -46,6 +49,9 @@ pub struct Rows<S> {
     end: u64,
     now: Vec<Option<Column>>,
     left: u64,
+    /// Rows so far, those that are lost left out, and how many of them are written with digits.
+    rows: u64,
+    spelled: u64,
     why: Option<Arc<str>>,
     text: Vec<u8>,
     given: usize,
@@ -110,6 +116,8 @@ impl<S: Read + Seek> Rows<S> {
             end,
             now: Vec::new(),
             left: 0,
+            rows: 0,
+            spelled: u64::MAX,
             why: None,
             text: Vec::new(),
             given: 0,
@@ -117,6 +125,14 @@ impl<S: Read + Seek> Rows<S> {
         rows.name(&footer, given);
         rows.groups = footer.groups.into_iter();
         Ok(rows)
+    }
+
+    /// The same for whoever reads the numbers of all but the first rows by their bits.
+    pub(crate) fn with_bits(self) -> Rows<S> {
+        Rows {
+            spelled: SPELLED,
+            ..self
+        }
     }
 
     /// The row of names, and which columns are read.
@@ -224,17 +240,24 @@ impl<S: Read + Seek> Rows<S> {
             self.left -= 1;
             let begun = self.text.len();
             let mut lost = self.why.clone();
+            let put = match self.rows < self.spelled {
+                true => spell,
+                false => bits::put,
+            };
             for (n, column) in self.now.iter_mut().enumerate() {
                 if n > 0 {
                     self.text.push(self.delimiter);
                 }
                 if let Some(column) = column {
-                    let why = column.write(&mut self.text)?;
+                    let why = column.write(&mut self.text, put)?;
                     lost = lost.or(why);
                 }
             }
             match lost {
-                None => self.text.extend_from_slice(self.behind.as_bytes()),
+                None => {
+                    self.text.extend_from_slice(self.behind.as_bytes());
+                    self.rows += 1;
+                }
                 Some(why) => {
                     self.text.truncate(begun);
                     self.text.extend_from_slice(LOST);
@@ -312,6 +335,13 @@ impl<S: Read + Seek> Read for Rows<S> {
         Ok(count)
     }
 }
+
+/// Appends a number with the fewest digits that are its bits.
+fn spell(value: f64, out: &mut Vec<u8>) {
+    // A vector takes all that is written.
+    let _ = write!(out, "{value:e}");
+}
+
 /// Whether the values of a column can be read as numbers, or as text where it may hold text.
 fn is_readable(leaf: &Leaf, may_be_text: bool) -> bool {
     let is_stored = match leaf.stored {

@@ -441,7 +441,10 @@ impl Input {
     /// # Errors
     /// As `line_input::open`.
     pub fn lines(&self, options: &Options) -> Result<Lines<Bytes>> {
-        let bytes = self.text(options)?;
+        let bytes = match self.text(options)? {
+            Bytes::Rows(rows) => Bytes::Rows(Box::new(rows.with_bits())),
+            other => other,
+        };
         let lines = line_input::open(&self.name, self.format, bytes, options)?;
         let of_forces = Options {
             wanted: Wanted::Forces,
