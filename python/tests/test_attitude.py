@@ -42,6 +42,16 @@ def test_shapes_and_units() -> None:
     assert repr(ATT).startswith("<strapd.Attitude: 500 over 4.990 s, gravity, world level, body flu; at last q w ")
 
 
+def test_without_a_covariance_the_attitude_has_the_same_bits() -> None:
+    whole, bare = strapd.integrate(GYR, t=T), strapd.integrate(GYR, t=T, covariance=False)
+    same_bits(whole.q, bare.q)
+    same_bits(whole.rate, bare.rate)
+    assert np.isfinite(whole.sigma).all() and np.isnan(bare.sigma).all() and bare.covariance.shape == (500, 3, 3)
+    assert np.isnan(bare[10:20].sigma).all()
+    with pytest.raises(ValueError, match="covariance=False"):
+        strapd.integrate(GYR, t=T, covariance=False, noise="consumer")
+
+
 def test_a_quarter_turn_takes_x_to_y() -> None:
     gyr = np.tile([0.0, 0.0, np.pi / 2], (101, 1))
     att = strapd.integrate(gyr, rate_hz=100)

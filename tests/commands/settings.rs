@@ -33,6 +33,50 @@ fn the_page_and_the_types_of_python_are_those_of_the_table() {
 }
 
 #[test]
+fn without_noise_an_attitude_keeps_its_bits_and_its_sigma_is_not_known() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let log = root().join("fixtures/xsens_mti.mcap");
+    std::fs::copy(log, at.join("log.mcap")).unwrap();
+    let rows = |flags: &str| {
+        let ran = strapd(at, &format!("replay log.mcap -o out.csv --force {flags}")).done();
+        let rows = std::fs::read_to_string(at.join("out.csv")).unwrap();
+        let cells = |row: &str, from: usize, to: usize| {
+            let cells: Vec<&str> = row.split(',').skip(from).take(to - from).collect();
+            cells.join(",")
+        };
+        let part = |from, to| {
+            rows.lines()
+                .skip(1)
+                .map(|row| cells(row, from, to))
+                .collect()
+        };
+        let [attitudes, sigmas]: [Vec<String>; 2] = [part(0, 11), part(11, 14)];
+        (attitudes, sigmas, ran.err.clone())
+    };
+    let (with, _, _) = rows("--aid none");
+    let (without, sigmas, said) = rows("--aid none --noise none");
+    assert!(with == without && !with.is_empty());
+    assert!(
+        sigmas
+            .iter()
+            .all(|sigma| sigma == "0,0,0" || sigma == "0.0,0.0,0.0"),
+        "{:?}",
+        sigmas.first()
+    );
+    assert!(said.contains("not known: no noise was stated"), "{said}");
+    let refused = strapd(
+        at,
+        "replay log.mcap -o out.csv --force --aid gravity --noise none",
+    );
+    assert!(
+        refused.err.contains("--noise none") && refused.err.contains("--aid none"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
 fn every_row_is_in_the_help_of_every_estimation_and_in_its_file() {
     let here = Path::new(".");
     let helps = ["replay", "report", "serve", "check", "calibrate"]

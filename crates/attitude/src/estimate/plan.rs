@@ -284,7 +284,7 @@ impl EstimationSettings {
         Ok(())
     }
 
-    /// A field needs stamps to find its gyro sample by, and a declination a field.
+    /// A filter weighs by the noise of its sensor.
     fn check_noise(&self) -> Result<(), Diagnostic> {
         if self.noise.is_none() && (self.aid != Aid::None || self.smooth) {
             return Err(Diagnostic::new(format!(
@@ -295,6 +295,7 @@ impl EstimationSettings {
         Ok(())
     }
 
+    /// A field needs stamps to find its gyro sample by, and a declination a field.
     fn check_field(&self) -> Result<(), Diagnostic> {
         let has_field = self.aid == Aid::GravityAndField;
         if self.declination != 0.0 && !has_field {

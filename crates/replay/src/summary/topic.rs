@@ -451,6 +451,9 @@ impl TopicSummary {
 
     /// Text of the sigma at the end, and what it is of: that of what corrects the attitude, else of the drift.
     fn sigma_text(&self) -> String {
+        if self.has_attitude() && self.final_sigma == [0.0; 3] && self.drift_deg_per_h() == 0.0 {
+            return "not known: no noise was stated".to_owned();
+        }
         let [x, y, z] = self.final_sigma.map(|v| significant(v.to_degrees(), 2));
         let of = match (self.smoothing(), &self.aided) {
             (Some(smoothing), _) => smoothing.sigma_text().to_owned(),
