@@ -32,7 +32,7 @@
 //! | stamped when a batch came (recordings) | spread evenly, at the rate of the batches | `Accepted` |
 //! | step above 1.5 times the ordinary | bridged up to `max_gap_secs`, beyond it `on_gap` | `Accepted` |
 //! | ... but the stamps catch up | a late stamp, not a gap | `Accepted` |
-//! | one to three rates far off the line between their neighbours (recordings) | replaced by that line, `REPAIRED` | `Accepted` |
+//! | one to three rates far off the line between their neighbours | replaced by that line, `REPAIRED`; live, what has left is taken back | `Accepted` |
 //!
 //! The ordinary step is learnt from the stream. An increment whose predecessor is missing covers its own
 //! interval only, so `start` is later than the stamp before, and the propagator fills the hole.
@@ -52,7 +52,7 @@ mod repairs;
 mod report;
 mod settings;
 mod spacing;
-mod spikes;
+pub(crate) mod spikes;
 mod timing;
 mod unit_change;
 
@@ -83,6 +83,8 @@ use gate::{Gate, MAX_STAMP};
 use mixture::MixtureWatch;
 use order::Order;
 use spikes::Spikes;
+use spikes::passed::Passed;
+pub(crate) use spikes::passed::{Revised, Revision};
 use timing::Timing;
 use unit_change::UnitWatch;
 
@@ -121,7 +123,7 @@ pub struct Conditioner {
     /// Looks for batches in a stream of which nothing waits.
     batch_learner: Option<BatchLearner>,
     /// Looks for spikes in the samples that have left, where none waits for its successors.
-    passed: Option<spikes::Passed>,
+    passed: Option<Passed>,
     /// Look for two sensors in one stream, and for units that change; whether values are rates.
     mixture: MixtureWatch,
     units: UnitWatch,
@@ -195,7 +197,7 @@ impl Conditioner {
             },
             primed: batch_line.is_some() || settings.coarse.is_some(),
             batch_learner: (is_live && batch_line.is_none()).then(BatchLearner::default),
-            passed: spikes::Passed::of(settings),
+            passed: Passed::of(settings),
             mixture: MixtureWatch::new(is_rate),
             units: UnitWatch::default(),
             is_rate,
@@ -252,6 +254,29 @@ impl Conditioner {
         self.finishing = false;
         self.report.spacing_nanos = self.timing.spacing();
         self.report.coarse_nanos = self.timing.coarse();
+    }
+
+    /// Somebody can go back to what was before a spike, and takes [`Conditioner::revisions`] for that.
+    pub(crate) fn keep_revisions(&mut self) {
+        self.passed.iter_mut().for_each(Passed::keep_revisions);
+    }
+
+    /// Judgements of samples that have left, since the last call.
+    #[inline]
+    pub(crate) fn revisions(&mut self) -> Vec<Revised> {
+        self.passed
+            .as_mut()
+            .map(Passed::revisions)
+            .unwrap_or_default()
+    }
+
+    /// Counts so many spikes as left, which were to be repaired: there was no state to go back to.
+    pub(crate) fn leave_spikes(&mut self, samples: u64) {
+        let (repaired, left) = (&mut self.report.spikes, &mut self.report.spikes_left);
+        let first = left.first.or(repaired.first);
+        repaired.samples = repaired.samples.saturating_sub(samples);
+        left.samples += samples;
+        (left.first, left.largest) = (first, left.largest.max(repaired.largest));
     }
 
     /// Outcome of the samples so far; those held back have no verdict yet.
@@ -396,7 +421,12 @@ impl Conditioner {
             };
             if let Some(batch_line) = &mut self.batch_line {
                 let at = Nanos(batch_line.push(entry.stamp.0));
-                self.time_one(*entry, at, out);
+                let repaired = self.spikes.as_mut().and_then(|spikes| {
+                    let steps = (self.timing.spacing(), self.timing.coarse());
+                    spikes.repaired(entry, ahead, steps, &mut self.report.spikes)
+                });
+                let entry = repaired.unwrap_or(*entry);
+                self.time_one(entry, at, out);
                 continue;
             }
             let is_alone = match ahead.first() {
@@ -419,11 +449,11 @@ impl Conditioner {
                 spikes.repaired(entry, ahead, steps, &mut self.report.spikes)
             });
             let entry = repaired.as_ref().unwrap_or(entry);
+            let sample = self.timing.one(entry, stamp, ahead, &mut self.report);
             if let Some(passed) = &mut self.passed {
-                let steps = (self.timing.spacing(), self.timing.coarse());
-                passed.take(entry, steps, &mut self.report.spikes_left);
+                passed.take(entry, &sample, out.len(), &self.timing, &mut self.report);
             }
-            out.push(self.timing.one(entry, stamp, ahead, &mut self.report));
+            out.push(sample);
             match timing::verdict(entry.status) {
                 Verdict::Accepted => self.report.counts.add(Verdict::Accepted),
                 verdict => self.report.note(verdict, entry.index, Some(stamp)),
@@ -484,7 +514,11 @@ impl Conditioner {
             if placement.moves(at) {
                 entry.status = entry.status.with(Status::RESTAMPED);
             }
-            out.push(self.timing.one(&entry, at, ahead, &mut self.report));
+            let sample = self.timing.one(&entry, at, ahead, &mut self.report);
+            if let Some(passed) = &mut self.passed {
+                passed.take(&entry, &sample, out.len(), &self.timing, &mut self.report);
+            }
+            out.push(sample);
             match timing::verdict(entry.status) {
                 Verdict::Accepted => self.report.counts.add(Verdict::Accepted),
                 verdict => self.report.note(verdict, entry.index, Some(entry.stamp)),

@@ -34,6 +34,7 @@ mod output_frame;
 mod plan;
 mod pooled;
 mod preparation;
+mod retaking;
 mod sample_kind;
 mod sensor_calibration;
 pub mod settings;

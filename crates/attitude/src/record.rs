@@ -281,7 +281,8 @@ impl Status {
     pub const REST: Status = Status(1 << 12);
     /// The tilt was too wrong to be corrected, and was set anew at this sample.
     pub const LEVELLED: Status = Status(1 << 13);
-    /// A spike of the gyro stood here: the rate is the line between its neighbours.
+    /// A spike of the gyro stood here: the rate is the line between its neighbours. Live, it stood in the attitudes just
+    /// before this one, which is the first without it.
     pub const REPAIRED: Status = Status(1 << 14);
 
     /// Both sets of bits.

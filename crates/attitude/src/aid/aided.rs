@@ -188,6 +188,19 @@ impl AidedPropagator {
             .unwrap_or_default()
     }
 
+    /// The same propagator, which keeps no innovations: those of one that is gone back to are kept already.
+    pub(crate) fn checkpoint(&mut self) -> AidedPropagator {
+        let kept = self.innovations.take();
+        let same = self.clone();
+        self.innovations = kept;
+        same
+    }
+
+    /// Keeps the innovations of the one that this is instead of.
+    pub(crate) fn keep_innovations_of(&mut self, before: &mut AidedPropagator) {
+        self.innovations = before.innovations.take();
+    }
+
     /// Whether they do.
     pub(crate) fn has_forces_beside(&self) -> bool {
         self.stream.forces.is_some()

@@ -83,7 +83,11 @@ impl Conditioner {
 
     /// Times one entry at a stamp that is not its own, with nothing to wait for.
     pub(super) fn time_one(&mut self, entry: Entry, at: Nanos, out: &mut Vec<RateSample>) {
-        out.push(self.timing.one(&entry, at, &[], &mut self.report));
+        let sample = self.timing.one(&entry, at, &[], &mut self.report);
+        if let Some(passed) = &mut self.passed {
+            passed.take(&entry, &sample, out.len(), &self.timing, &mut self.report);
+        }
+        out.push(sample);
         match timing::verdict(entry.status) {
             Verdict::Accepted => self.report.counts.add(Verdict::Accepted),
             verdict => self.report.note(verdict, entry.index, Some(entry.stamp)),

@@ -131,7 +131,7 @@ pub struct Report {
     pub accel_dropped: u64,
     /// Spikes that were repaired.
     pub spikes: SpikeCount,
-    /// Spikes that had left when what came behind them showed them: of a stream that waits for nothing.
+    /// Spikes that had left when what came behind them showed them, and were not taken back.
     pub spikes_left: SpikeCount,
     /// Two sensors that take turns in the stream; `None` where there is one.
     pub mixture: Option<Mixture>,

@@ -80,7 +80,7 @@ pub struct Settings {
     pub bias: BodyRate,
     /// Full scale of the gyro in rad/s, sensor axes: components at or beyond it are flagged.
     pub gyro_range: Option<f64>,
-    /// Treatment of spikes, where samples wait for their successors.
+    /// Treatment of spikes: repaired where samples wait for their successors, else found when these have come.
     pub spikes: SpikePolicy,
     /// Leave out samples earlier than this, seconds after the first stamp.
     pub start: Option<f64>,

@@ -4,8 +4,10 @@
 //! glitch is a run of one to three samples far off the line between its neighbours, while these agree with each other,
 //! nothing shortly before was like it, and the accelerometer felt no blow. `docs/theory/spikes.md` derives the rule.
 //!
-//! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), it repairs nothing
-//! and counts what has passed.
+//! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), [`passed`] judges by
+//! the same rule what has left, and the estimator goes back to the state before it.
+
+pub(super) mod passed;
 
 use super::gate::{Entry, NO_ACCEL, finite_accel};
 use super::repairs::SpikePolicy;
@@ -22,6 +24,15 @@ pub struct SpikeCount {
     pub first: Option<Nanos>,
     /// Farthest that one was off the line between its neighbours, rad/s.
     pub largest: f64,
+}
+
+impl SpikeCount {
+    /// Adds a sample that was so far off.
+    fn add(&mut self, at: Nanos, off: &Vector3<f64>) {
+        self.samples += 1;
+        self.first.get_or_insert(at);
+        self.largest = self.largest.max(off.norm());
+    }
 }
 
 /// Longest run of samples that can be a spike.
@@ -58,42 +69,6 @@ pub(super) struct Spikes {
     drops_force: bool,
 }
 
-/// Looks for spikes in entries that have left, and lets them be.
-#[derive(Clone, Debug)]
-pub(super) struct Passed {
-    spikes: Spikes,
-    /// The last entries, oldest first.
-    last: [Option<Entry>; LONGEST + 1],
-}
-
-impl Passed {
-    /// The stage that `settings` ask for, where nothing waits.
-    pub(super) fn of(settings: &Settings) -> Option<Passed> {
-        let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window == 0;
-        (is_on && is_rate(settings)).then(|| Passed {
-            spikes: Spikes::new(),
-            last: [None; LONGEST + 1],
-        })
-    }
-
-    /// Takes the next entry, and judges the one that came so many before it that those between tell.
-    #[inline]
-    pub(super) fn take(
-        &mut self,
-        entry: &Entry,
-        steps: (Option<i64>, Option<i64>),
-        count: &mut SpikeCount,
-    ) {
-        self.last.rotate_left(1);
-        if let Some(newest) = self.last.last_mut() {
-            *newest = Some(*entry);
-        }
-        if let [Some(first), Some(a), Some(b), Some(c)] = self.last {
-            self.spikes.repaired(&first, &[a, b, c], steps, count);
-        }
-    }
-}
-
 fn is_rate(settings: &Settings) -> bool {
     matches!(settings.kind, SampleKind::Rate | SampleKind::Average)
 }
@@ -122,6 +97,19 @@ struct Run {
     ends: (Vector3<f64>, Vector3<f64>),
     /// Least distance from the line, rad/s.
     distance: f64,
+}
+
+/// Evidence for and against a spike.
+struct Weight {
+    /// Distance from the line, in times of what is ordinary about it.
+    ratio: f64,
+    /// One sample only.
+    is_alone: bool,
+    /// The accelerometer felt nothing about it.
+    is_quiet: bool,
+    is_above_quanta: bool,
+    /// The force stepped onto it, or off it: it is as wrong as the rate.
+    drops_force: bool,
 }
 
 impl Spikes {
@@ -163,9 +151,7 @@ impl Spikes {
             return None;
         };
         self.past.push(entry, &value);
-        count.samples += 1;
-        count.first.get_or_insert(entry.stamp);
-        count.largest = count.largest.max((entry.value - value).norm());
+        count.add(entry.stamp, &(entry.value - value));
         let status = Status(entry.status.0 & !Status::SATURATED.0);
         Some(Entry {
             value,
@@ -198,40 +184,74 @@ impl Spikes {
         }
         let most = (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize;
         (1..=most).find_map(|samples| {
-            let run = Run::of(&self.past.rates[0], entry, ahead, samples)?;
-            let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
-            let longest = LONGEST_SPAN * (samples as i64 + 1) * spacing;
-            if !(0..=longest.saturating_add(coarse.unwrap_or(0))).contains(&span) {
-                return None;
-            }
-            self.begin(&run, entry, ahead)
+            let run = self.run_of(entry, ahead, samples, spacing, coarse)?;
+            let weight = self.weight(&run, entry, ahead);
+            weight.is_spike().then(|| self.begin(&run, &weight, ahead))
         })
     }
 
-    /// The value of the first sample of `run`, if it is a spike.
+    /// The run of so many samples that begins at `entry`, where it and its stamps are such that it can be a spike.
+    #[inline]
+    fn run_of(
+        &self,
+        entry: &Entry,
+        ahead: &[Entry],
+        samples: usize,
+        spacing: i64,
+        coarse: Option<i64>,
+    ) -> Option<Run> {
+        let run = Run::of(&self.past.rates[0], entry, ahead, samples)?;
+        let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
+        let longest = LONGEST_SPAN * (samples as i64 + 1) * spacing;
+        (0..=longest.saturating_add(coarse.unwrap_or(0)))
+            .contains(&span)
+            .then_some(run)
+    }
+
+    /// Evidence for a spike, by the samples in `ahead`.
     #[cold]
-    fn begin(&mut self, run: &Run, entry: &Entry, ahead: &[Entry]) -> Option<Vector3<f64>> {
+    fn weight(&self, run: &Run, entry: &Entry, ahead: &[Entry]) -> Weight {
         let (rate, force) = self.past.ordinary();
         let ends_apart = (run.ends.1 - run.ends.0).norm();
-        let ratio = run.distance / (ends_apart + rate + FLOOR);
-        let step = self.past.force_step(entry, ahead, run.samples);
-        let is_quiet = step.is_some_and(|step| step < 2.0 * force + QUIET_FORCE);
-        let is_above_quanta = match self.past.quantum.is_finite() {
-            true => run.distance > QUANTA * self.past.quantum,
-            false => run.distance > UNKNOWN_QUANTUM,
+        let is_quiet = |step: f64| step < 2.0 * force + QUIET_FORCE;
+        let step = |behind| {
+            self.past
+                .force_step(entry, ahead, run.samples + behind, run.samples)
         };
-        let is_spike = (ratio > QUIET && is_quiet) || (run.samples == 1 && ratio > ANY);
-        if !(is_spike && is_above_quanta) {
-            return None;
+        Weight {
+            ratio: run.distance / (ends_apart + rate + FLOOR),
+            is_alone: run.samples == 1,
+            is_quiet: step(2).is_some_and(is_quiet),
+            is_above_quanta: match self.past.quantum.is_finite() {
+                true => run.distance > QUANTA * self.past.quantum,
+                false => run.distance > UNKNOWN_QUANTUM,
+            },
+            drops_force: step(1).is_some_and(|step| !is_quiet(step)),
         }
-        self.drops_force = step.is_some() && !is_quiet;
+    }
+
+    /// The value of the first sample of `run`, which is a spike; the others are noted.
+    #[cold]
+    fn begin(&mut self, run: &Run, weight: &Weight, ahead: &[Entry]) -> Vector3<f64> {
+        self.drops_force = weight.drops_force;
         for (n, slot) in self.run.iter_mut().enumerate() {
             *slot = ahead
                 .get(n)
                 .filter(|_| n + 1 < run.samples)
                 .map(|next| (next.index, run.line(n + 1)));
         }
-        Some(run.line(0))
+        run.line(0)
+    }
+}
+
+impl Weight {
+    /// Whether it is one whatever the accelerometer says.
+    fn is_certain(&self) -> bool {
+        self.is_alone && self.ratio > ANY && self.is_above_quanta
+    }
+
+    fn is_spike(&self) -> bool {
+        self.is_certain() || (self.ratio > QUIET && self.is_quiet && self.is_above_quanta)
     }
 }
 
@@ -321,13 +341,19 @@ impl Past {
         (largest.0.sqrt(), largest.1.sqrt())
     }
 
-    /// The largest step of the force from as many samples before the run as are in it to one behind it; `None` without
-    /// forces.
-    fn force_step(&self, entry: &Entry, ahead: &[Entry], samples: usize) -> Option<f64> {
+    /// The largest step of the force from as many samples before the run as are in it to the `count`th from its first;
+    /// `None` without forces.
+    fn force_step(
+        &self,
+        entry: &Entry,
+        ahead: &[Entry],
+        count: usize,
+        samples: usize,
+    ) -> Option<f64> {
         let before = self.forces.get(..=samples)?.iter().rev();
         let mut last = (*before.clone().next()?)?;
         let mut largest = 0.0_f64;
-        let following = std::iter::once(entry).chain(ahead).take(samples + 2);
+        let following = std::iter::once(entry).chain(ahead).take(count);
         let forces = before
             .skip(1)
             .copied()
@@ -342,4 +368,4 @@ impl Past {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::indexing_slicing)]
-mod tests;
+pub(crate) mod tests;

@@ -254,6 +254,18 @@ impl Timing {
         }
     }
 
+    /// Measurement of `sample`, which this has timed, if it were made of this entry.
+    pub(super) fn revalued(&self, sample: &RateSample, entry: &Entry) -> Measured {
+        let interval = match entry.interval {
+            0 => sample.stamp.since(sample.start),
+            own => own,
+        };
+        sample.gyro.with(match self.kind {
+            SampleKind::Rate => entry.value - self.bias,
+            _ => self.angle(entry, interval),
+        })
+    }
+
     /// Start of the interval and what was turned in it (for rates: the stamp, and the rate).
     #[inline(always)]
     fn integrate(
@@ -280,12 +292,17 @@ impl Timing {
         } else {
             stamp.since(start)
         };
+        (start, self.angle(entry, interval))
+    }
+
+    /// Angle of an entry over an interval, nanoseconds.
+    #[inline(always)]
+    fn angle(&self, entry: &Entry, interval: i64) -> Vector3<f64> {
         let secs = interval as f64 * 1e-9;
-        let angle = match self.kind {
+        match self.kind {
             SampleKind::DeltaAngle | SampleKind::Rotation => entry.value - self.bias * secs,
             SampleKind::Rate | SampleKind::Average => (entry.value - self.bias) * secs,
-        };
-        (start, angle)
+        }
     }
 
     /// Duration of one increment when its predecessor does not state it.

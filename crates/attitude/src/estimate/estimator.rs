@@ -16,6 +16,7 @@ use super::open_kind::{Event, OpenKind};
 use super::output_frame::{OutputFrame, turned_north};
 use super::plan::{EstimationSettings, Initial, Noise};
 use super::preparation::{Prepared, is_causal};
+use super::retaking::{Besides, Retaking, Stages};
 use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
@@ -26,7 +27,7 @@ use crate::condition::{self, Clock, Conditioner};
 use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
 use crate::propagate::{self, Executor, Method, Propagator};
-use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
+use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use crate::smooth::PriorSigmas;
 
 /// Samples at once that memory is kept for.
@@ -38,9 +39,11 @@ pub struct Estimator {
     conditioner: Conditioner,
     regulariser: Option<Regulariser>,
     integrator: Integrator,
+    /// Progress of samples that may be a spike.
+    retaking: Retaking,
     asked: OutputFrame,
     /// Vectors that came between the rates, each before the rate of this number.
-    beside: Vec<(usize, Nanos, AuxiliaryVector)>,
+    beside: Besides,
     /// Auxiliary inputs; `None` where nothing of them is used.
     besides: Option<AuxiliaryInputs>,
     /// Watch over the gyro, where somebody wants it; it changes no attitude and is not remembered.
@@ -221,7 +224,12 @@ impl Estimator {
         .map_err(|e| Diagnostic::from(&e))?;
         Ok(Estimator {
             settings: settings_fingerprint(settings, plan, prepared, &noise),
-            conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
+            conditioner: {
+                let mut conditioner = Conditioner::new(settings).map_err(|e| e.to_string())?;
+                conditioner.keep_revisions();
+                conditioner
+            },
+            retaking: Retaking::default(),
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
             asked: OutputFrame {
@@ -259,6 +267,7 @@ impl Estimator {
     pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), Diagnostic> {
         self.note(|| Event::Resume(Box::new(*last)));
         let last = self.asked.undone(last);
+        self.keep_doubted();
         self.integrator.resume(&last)
     }
 
@@ -316,6 +325,7 @@ impl Estimator {
                 .integrator
                 .recall(&memory.propagation, memory.aiding.as_ref());
         if fits {
+            self.keep_doubted();
             // What is recalled cannot be estimated again.
             self.open = None;
             self.conditioner = conditioner;
@@ -340,6 +350,7 @@ impl Estimator {
     /// [`Status::RESET`]: crate::record::Status::RESET
     pub fn begin_anew(&mut self, anew: &RestartRequest) {
         self.note(|| Event::Restart(Box::new(anew.clone())));
+        self.keep_doubted();
         self.integrator.begin_anew(anew);
         self.begins_anew = true;
     }
@@ -351,6 +362,7 @@ impl Estimator {
     /// [`AidedPropagator::turn_heading`]: crate::aid::AidedPropagator::turn_heading
     pub fn turn_heading(&mut self, heading: f64) -> bool {
         self.note(|| Event::Heading(heading));
+        self.retaking.note_heading(heading);
         self.integrator.turn_heading(heading)
     }
 
@@ -514,6 +526,7 @@ impl Estimator {
     ) -> Result<(), E> {
         self.conditioner.finish(&mut self.rates);
         self.make(exec);
+        self.keep_doubted();
         std::mem::swap(&mut self.out, &mut self.before);
         if let Some(regulariser) = &mut self.regulariser {
             regulariser.finish(&mut self.even);
@@ -532,55 +545,37 @@ impl Estimator {
         taken
     }
 
+    /// Integrates what was conditioned.
     fn propagate(&mut self, exec: &impl Executor) {
-        if self.beside.is_empty() {
-            self.push_rates(exec);
-            return;
+        let besides = std::mem::take(&mut self.beside);
+        let between = (besides, self.conditioner.revisions());
+        let mut rates = std::mem::take(&mut self.rates);
+        let (retaking, mut stages) = self.stages();
+        let left = retaking.integrate(&mut stages, &mut rates, between, exec);
+        if left > 0 {
+            self.conditioner.leave_spikes(left);
         }
-        let rates = std::mem::take(&mut self.rates);
-        let mut from = 0;
-        for (place, stamp, beside) in std::mem::take(&mut self.beside) {
-            self.rates
-                .extend_from_slice(rates.get(from..place).unwrap_or(&[]));
-            self.push_rates(exec);
-            if let AuxiliaryVector::Force(force) = &beside {
-                if let Some(watch) = &mut self.watch {
-                    watch.take_force(stamp, *force);
-                }
-                if let Some(watch) = &mut self.magnetometer {
-                    watch.take_force(stamp, *force);
-                }
-            }
-            self.integrator.take_beside(stamp, beside);
-            from = place;
-        }
-        self.rates
-            .extend_from_slice(rates.get(from..).unwrap_or(&[]));
-        self.push_rates(exec);
+        rates.clear();
+        self.rates = rates;
     }
 
-    fn push_rates(&mut self, exec: &impl Executor) {
-        if let Some(watch) = &mut self.watch {
-            watch.push(&self.rates);
-        }
-        if let Some(watch) = &mut self.magnetometer {
-            watch.push(&self.rates);
-        }
-        let rates = match &mut self.regulariser {
-            None => &mut self.rates,
-            Some(regulariser) => {
-                regulariser.push(&self.rates, &mut self.even);
-                &mut self.even
-            }
+    /// Samples that may be a spike stay as they are.
+    fn keep_doubted(&mut self) {
+        let (retaking, mut stages) = self.stages();
+        retaking.keep(&mut stages);
+    }
+
+    fn stages(&mut self) -> (&mut Retaking, Stages<'_>) {
+        let stages = Stages {
+            integrator: &mut self.integrator,
+            regulariser: &mut self.regulariser,
+            gyro: &mut self.watch,
+            magnetometer: &mut self.magnetometer,
+            begins_anew: &mut self.begins_anew,
+            even: &mut self.even,
+            out: &mut self.out,
         };
-        if let Some(first) = rates.first_mut()
-            && std::mem::take(&mut self.begins_anew)
-        {
-            first.join = Join::Reset;
-        }
-        self.integrator.push(rates, exec, &mut self.out);
-        self.even.clear();
-        self.rates.clear();
+        (&mut self.retaking, stages)
     }
 
     /// Holds the gyro against accelerometer and magnetometer from now on, for [`Estimator::consistency`] and

@@ -135,6 +135,23 @@ impl Integrator {
         }
     }
 
+    /// State by now, to go back to; `None` of a recording, whose samples are repaired before they come here.
+    pub(super) fn checkpoint(&mut self) -> Option<Integrator> {
+        match self {
+            Integrator::Alone(propagator) => Some(Integrator::Alone(propagator.clone())),
+            Integrator::Aided(aided) => Some(Integrator::Aided(Box::new(aided.checkpoint()))),
+            Integrator::Smoothed(_) => None,
+        }
+    }
+
+    /// Goes on as `other`, which was a checkpoint of this.
+    pub(super) fn go_on_as(&mut self, mut other: Integrator) {
+        if let (Integrator::Aided(aided), Integrator::Aided(before)) = (&mut other, &mut *self) {
+            aided.keep_innovations_of(before);
+        }
+        *self = other;
+    }
+
     pub(super) fn continue_counts_of(&mut self, resets: u32) {
         match self {
             Integrator::Alone(propagator) => propagator.continue_counts_of(resets),

@@ -79,7 +79,7 @@ pub struct EstimationSettings {
     pub regularise_stamps: bool,
     /// Full scale of the gyro, rad/s: components at or beyond it are marked saturated. Default: `None`, unknown.
     pub gyro_range: Option<f64>,
-    /// Treatment of spikes of the gyro in a recording: one to three samples that nothing around them agrees with.
+    /// Treatment of spikes of the gyro: one to three samples that nothing around them agrees with.
     /// Default: [`SpikePolicy::Repair`].
     pub spikes: SpikePolicy,
     /// Whether cures that are certain are applied to a recording. Default: `false`, findings name them.

@@ -152,6 +152,7 @@ pub fn of_sensor(report: &Report, propagation: &propagate::Report, clock: &str) 
     let batches = report.batches.as_ref().map(batches_message);
     out.extend(batches.map(|said| Finding::said(Severity::Warning, "batches", &said)));
     out.extend(saturated(report));
+    out.extend(spikes(report));
     out.extend(spikes_left(report));
     out.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     out
@@ -351,11 +352,11 @@ fn spikes_of((samples, largest): (u64, f64), done: &str) -> Option<Finding> {
     })
 }
 
-/// The same in a stream that waits for nothing.
+/// The same where a live stream could not go back to what was before.
 fn spikes_left(report: &Report) -> Option<Finding> {
     let found = report.spikes_left;
     let finding = spikes_of((found.samples, found.largest), ": left as they came")?;
-    Some(finding.advise("a live stream waits for no later sample: mend the bus or its driver; a recording is repaired"))
+    Some(finding.advise("there was no state to go back to: mend the bus or its driver"))
 }
 
 fn no_reference(found: u64) -> Finding {

@@ -18,7 +18,7 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// A hand: still for 3 s, then roll, pitch and yaw swing by 50, 40 and 120 degrees. Rates in rad/s, forces in m/s^2.
-fn hand(secs: usize, hz: usize) -> Vec<RawSample> {
+pub(crate) fn hand(secs: usize, hz: usize) -> Vec<RawSample> {
     let mut noise = noise(1);
     (0..secs * hz)
         .map(|n| {
@@ -62,14 +62,18 @@ fn hand(secs: usize, hz: usize) -> Vec<RawSample> {
         .collect()
 }
 
-fn add(raw: &mut RawSample, axis: usize, rate: f64) {
+pub(crate) fn add(raw: &mut RawSample, axis: usize, rate: f64) {
     if let Some(value) = raw.gyro.as_mut().and_then(|gyro| gyro.get_mut(axis)) {
         *value += rate;
     }
 }
 
 /// Samples out of the conditioner, fed in pieces of so many.
-fn conditioned(settings: &Settings, raw: &[RawSample], piece: usize) -> (Vec<RateSample>, Report) {
+pub(crate) fn conditioned(
+    settings: &Settings,
+    raw: &[RawSample],
+    piece: usize,
+) -> (Vec<RateSample>, Report) {
     let mut conditioner = Conditioner::new(settings).unwrap();
     let mut out = Vec::new();
     for piece in raw.chunks(piece) {
@@ -85,7 +89,7 @@ fn repaired(out: &[RateSample]) -> Vec<usize> {
     found.map(|(n, _)| n).collect()
 }
 
-fn rate(sample: &RateSample) -> Vector3<f64> {
+pub(crate) fn rate(sample: &RateSample) -> Vector3<f64> {
     match sample.gyro {
         Measured::Rate(rate) => rate.0,
         Measured::Increment(angle) => angle.0,

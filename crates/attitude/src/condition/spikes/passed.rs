@@ -1,0 +1,223 @@
+//! Sample that leaves at once -> what is to be taken back of it. Pure.
+//!
+//! Apart from the repair in a recording because the samples have left when those behind them show what they were. A doubt
+//! begins where the rate steps by so much that a spike can begin there (for any spike it must: the rule's distance is
+//! at most the step, and exceeds four times what is ordinary), and ends when the rule has all it needs: one to four
+//! samples later. What integrates keeps its state from the one to the other.
+
+use super::super::gate::Entry;
+use super::super::report::Report;
+use super::super::timing::Timing;
+use super::{FLOOR, LONGEST, LONGEST_NANOS, LONGEST_STEP_NANOS, PAST, QUIET, Run, Spikes, is_rate};
+use crate::condition::{Settings, SpikePolicy};
+use crate::record::{RateSample, Status};
+
+/// Samples that wait for a judgement at most: a run, and the two behind it by which it is judged.
+const MOST: usize = LONGEST + 2;
+
+/// Judgement of samples that have left.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Revision {
+    /// Samples may be taken back from here on.
+    Doubt,
+    /// The first samples of those in doubt are as they left.
+    Sound(usize),
+    /// The first samples of those in doubt are to be these instead.
+    Repaired(Vec<RateSample>),
+    /// The doubt is over.
+    Over,
+}
+
+/// Judgement, and the sample before which it came.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Revised {
+    /// Number of samples put out before it.
+    pub(crate) place: usize,
+    pub(crate) revision: Revision,
+}
+
+/// Looks for spikes in samples that have left.
+#[derive(Clone, Debug)]
+pub(in crate::condition) struct Passed {
+    spikes: Spikes,
+    /// Samples in doubt, oldest first.
+    waiting: Vec<(Entry, RateSample)>,
+    /// Somebody goes back to what was before a spike, by these.
+    revisions: Option<Vec<Revised>>,
+}
+
+/// Opinion about the oldest sample in doubt.
+enum Judgement {
+    Sound,
+    /// Samples behind it are still needed.
+    Open,
+    Spike(Run, bool),
+}
+
+impl Passed {
+    /// The stage that `settings` ask for, where nothing waits.
+    pub(in crate::condition) fn of(settings: &Settings) -> Option<Passed> {
+        let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window == 0;
+        (is_on && is_rate(settings)).then(|| Passed {
+            spikes: Spikes::new(),
+            waiting: Vec::new(),
+            revisions: None,
+        })
+    }
+
+    /// Keeps revisions from now on, for [`Passed::revisions`].
+    pub(in crate::condition) fn keep_revisions(&mut self) {
+        self.revisions.get_or_insert_default();
+    }
+
+    /// Takes the revisions since the last call.
+    #[inline]
+    pub(in crate::condition) fn revisions(&mut self) -> Vec<Revised> {
+        match &mut self.revisions {
+            Some(kept) if !kept.is_empty() => std::mem::take(kept),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Takes the next entry, which leaves as `sample` behind `place` others.
+    #[inline]
+    pub(in crate::condition) fn take(
+        &mut self,
+        entry: &Entry,
+        sample: &RateSample,
+        place: usize,
+        timing: &Timing,
+        report: &mut Report,
+    ) {
+        if self.waiting.is_empty() && !self.is_suspect(entry, timing.spacing()) {
+            self.spikes.past.push(entry, &entry.value);
+            return;
+        }
+        self.doubt(entry, sample, place, timing, report);
+    }
+
+    /// Whether a spike can begin at this entry.
+    #[inline]
+    fn is_suspect(&self, entry: &Entry, spacing: Option<i64>) -> bool {
+        let past = &self.spikes.past;
+        let step = (entry.value - past.rates[0]).norm_squared();
+        if step <= QUIET * QUIET * FLOOR * FLOOR || past.count <= PAST {
+            return false;
+        }
+        let has_step = spacing.is_some_and(|step| (1..=LONGEST_STEP_NANOS).contains(&step));
+        let ordinary = QUIET * (past.ordinary().0 + FLOOR);
+        has_step && step > ordinary * ordinary
+    }
+
+    #[cold]
+    fn doubt(
+        &mut self,
+        entry: &Entry,
+        sample: &RateSample,
+        place: usize,
+        timing: &Timing,
+        report: &mut Report,
+    ) {
+        let note = |revisions: &mut Option<Vec<Revised>>, revision| {
+            if let Some(kept) = revisions {
+                kept.push(Revised { place, revision });
+            }
+        };
+        let mut is_new = self.waiting.is_empty();
+        self.waiting.push((*entry, *sample));
+        while let [(first, _), behind @ ..] = self.waiting.as_slice() {
+            let first = *first;
+            if behind.is_empty() && !is_new {
+                note(&mut self.revisions, Revision::Over);
+                is_new = true;
+                if !self.is_suspect(&first, timing.spacing()) {
+                    self.spikes.past.push(&first, &first.value);
+                    self.waiting.clear();
+                    return;
+                }
+            }
+            if is_new {
+                note(&mut self.revisions, Revision::Doubt);
+                return;
+            }
+            let (count, revision) = match self.judgement(&first, timing) {
+                Judgement::Open => return,
+                Judgement::Sound => {
+                    self.spikes.past.push(&first, &first.value);
+                    (1, Revision::Sound(1))
+                }
+                Judgement::Spike(run, drops_force) => {
+                    let repaired = self.repaired(&run, drops_force, timing, report);
+                    (run.samples, Revision::Repaired(repaired))
+                }
+            };
+            note(&mut self.revisions, revision);
+            self.waiting.drain(..count.min(self.waiting.len()));
+        }
+    }
+
+    /// Judges the oldest sample by those behind it.
+    fn judgement(&self, first: &Entry, timing: &Timing) -> Judgement {
+        let spacing = timing
+            .spacing()
+            .filter(|_| self.is_suspect(first, timing.spacing()));
+        let Some(spacing) = spacing else {
+            return Judgement::Sound;
+        };
+        let mut ahead = [*first; MOST];
+        let behind = self.waiting.get(1..).unwrap_or_default();
+        for (slot, (entry, _)) in ahead.iter_mut().zip(behind) {
+            *slot = *entry;
+        }
+        let ahead = ahead.get(..behind.len()).unwrap_or(&ahead);
+        let most = (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize;
+        for samples in 1..=most {
+            if ahead.len() < samples {
+                return Judgement::Open;
+            }
+            let run = self
+                .spikes
+                .run_of(first, ahead, samples, spacing, timing.coarse());
+            let Some(run) = run else {
+                continue;
+            };
+            let weight = self.spikes.weight(&run, first, ahead);
+            // Until it has come, the force behind may still tell of a blow.
+            if weight.is_spike() && !weight.is_certain() && ahead.len() <= samples {
+                return Judgement::Open;
+            }
+            if weight.is_spike() {
+                return Judgement::Spike(run, weight.drops_force);
+            }
+        }
+        Judgement::Sound
+    }
+
+    /// The samples of `run`, which are the oldest, as they should have left.
+    fn repaired(
+        &mut self,
+        run: &Run,
+        drops_force: bool,
+        timing: &Timing,
+        report: &mut Report,
+    ) -> Vec<RateSample> {
+        let count = match self.revisions.is_some() {
+            true => &mut report.spikes,
+            false => &mut report.spikes_left,
+        };
+        let mut repaired = Vec::new();
+        for (n, (entry, sample)) in self.waiting.iter().take(run.samples).enumerate() {
+            let value = run.line(n);
+            self.spikes.past.push(entry, &value);
+            count.add(entry.stamp, &(entry.value - value));
+            let status = Status(sample.status.0 & !Status::SATURATED.0);
+            repaired.push(RateSample {
+                gyro: timing.revalued(sample, &Entry { value, ..*entry }),
+                accel: sample.accel.filter(|_| !drops_force),
+                status: status.with(Status::REPAIRED),
+                ..*sample
+            });
+        }
+        repaired
+    }
+}
