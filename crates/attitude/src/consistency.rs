@@ -6,6 +6,7 @@
 //!
 //! ```text
 //! Reading -> blocks (20 ms, bias of rest) -> segment (4 s: scatter of gravity under a map) -> bank (evidence) -> refine
+//! segments in order -> change (other axes from one moment on)
 //! ```
 //!
 //! The bank runs only where gravity wanders as recorded, which healthy sensors do not let it do. Memory is bounded, and
@@ -15,6 +16,7 @@
 
 mod bank;
 mod blocks;
+mod change;
 mod field;
 mod refine;
 mod segment;
@@ -24,6 +26,8 @@ mod tests;
 pub use self::bank::CHIPS;
 use self::bank::{Answer, BANK, Evidence, Verdict};
 use self::blocks::{Block, Blocks, Rest, Step};
+pub use self::change::AxesChange;
+use self::change::Sound;
 pub use self::field::{FieldConsistency, FieldDisagreement, FieldIron, FieldReading};
 use self::refine::refine;
 use self::segment::{SEGMENT_SECS, Segment};
@@ -118,6 +122,11 @@ pub struct Consistency {
     bank: Option<Evidence>,
     held: usize,
     settled: Option<Verdict>,
+    /// Segments in which gravity stood still, for what comes later.
+    sound: Sound,
+    /// Axes that are others from one moment on, how often in a row they were seen, and whether it is said.
+    change: Option<AxesChange>,
+    change_held: usize,
     /// Whether it runs beside a stream without an end: it keeps no segment that does not scatter, and closes a bank
     /// that finds nothing.
     is_live: bool,
@@ -138,6 +147,9 @@ impl Default for Consistency {
             bank: None,
             held: 0,
             settled: None,
+            sound: Sound::default(),
+            change: None,
+            change_held: 0,
             is_live: false,
             moved: 0,
         }
@@ -158,6 +170,19 @@ impl Consistency {
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.settled.is_none() && self.bank.is_none() && self.moved >= SOUND_LEAST
+    }
+
+    /// Whether nothing speaks against the gyro: no disagreement, no change of its axes.
+    #[must_use]
+    pub fn agrees(&self) -> bool {
+        self.settled.is_none() && self.axes_change().is_none()
+    }
+
+    /// Axes of the gyro that are others from one moment on; `None` where they are not, or too little motion on either
+    /// side tells.
+    #[must_use]
+    pub fn axes_change(&self) -> Option<AxesChange> {
+        self.change.filter(|_| self.change_held >= HOLD)
     }
 
     /// Takes the next reading; one without numbers is passed over.
@@ -263,6 +288,9 @@ impl Consistency {
             return;
         }
         let scatter = self.identity.push(&segment, |_| true).as_recorded();
+        if scatter <= GATE_SCATTER {
+            self.sound.push(&self.run, &segment, gravity, bias);
+        }
         self.scattered.push_back(scatter > GATE_SCATTER);
         if self.scattered.len() > GATE_LAST {
             self.scattered.pop_front();
@@ -294,8 +322,30 @@ impl Consistency {
         }
         let verdict = self.bank.as_ref().and_then(Evidence::verdict);
         self.held = verdict.map_or(0, |_| self.held + 1);
+        self.look_for_change();
         if self.held >= HOLD {
             self.settled = verdict;
         }
+    }
+
+    /// Judges the parts of the recording by themselves, until a change is certain.
+    fn look_for_change(&mut self) {
+        if self.change_held >= HOLD {
+            return;
+        }
+        let settled = self.settled.as_ref();
+        let back = || {
+            self.bank
+                .as_ref()
+                .zip(settled)
+                .and_then(|(bank, settled)| change::back(bank, settled))
+        };
+        let away = self
+            .bank
+            .as_ref()
+            .and_then(|bank| change::away(bank, &self.sound));
+        let found = away.or_else(back);
+        self.change_held = found.map_or(0, |_| self.change_held + 1);
+        self.change = found;
     }
 }

@@ -10,6 +10,7 @@ use strapd_attitude::setting::Choice;
 pub(crate) const MIXED: &str = "two-sensors";
 pub(crate) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
 pub(crate) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
+pub(crate) const GYRO_AXES_CHANGE: &str = "gyro-axes-change";
 /// Codes of a sensor that is read in wrong axes, by a wrong factor or in a wrong unit: the data show the right one.
 const MISREAD: [&str; 4] = ["gyro-axes", "gyro-scale", "unit-degrees", "mag-axes"];
 
@@ -90,7 +91,8 @@ impl Finding {
 
     /// Whether the attitude is wrong by more than its sigma, which knows nothing of it.
     pub(crate) fn is_beyond_sigma(&self) -> bool {
-        let is_no_sensor = [MIXED, GYRO_UNIT_CHANGE, ACCEL_UNIT_CHANGE].contains(&self.code);
+        let no_sensor = [MIXED, GYRO_UNIT_CHANGE, ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE];
+        let is_no_sensor = no_sensor.contains(&self.code);
         self.severity == Severity::Error && (is_no_sensor || self.is_misread())
     }
 

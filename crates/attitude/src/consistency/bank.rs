@@ -5,6 +5,7 @@
 
 use super::segment::Segment;
 use crate::median::median;
+use crate::record::Nanos;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
 use std::sync::LazyLock;
@@ -37,20 +38,22 @@ const LEAST_GRAVITY: f64 = 0.5;
 /// Segments that count: what came before is forgotten.
 const MEMORY: usize = 64;
 /// Scatter of gravity that is none, g^2.
-const FLOOR: f64 = 4e-4;
+pub(super) const FLOOR: f64 = 4e-4;
 /// Most that one segment says.
 const CLIP: f64 = 3.0;
 /// Evidence below which a hypothesis is judged by every fourth segment alone: eight have spoken against it. Of a sound
 /// sensor that is nearly all of them.
 const HOPELESS: f64 = -8.0 * CLIP;
 const SELDOM: usize = 4;
+/// Scatter as recorded, g^2, of a segment by which all are judged: axes may be others from here on.
+const UNUSUAL: f64 = 0.01;
 /// Evidence of a segment that tells something.
-const TELLING: f64 = 0.3;
+pub(super) const TELLING: f64 = 0.3;
 
 /// Least evidence, telling segments, and share of them that agree.
 const LEAST_EVIDENCE: f64 = 8.0;
-const LEAST_SEGMENTS: usize = 6;
-const LEAST_SHARE: f64 = 0.85;
+pub(super) const LEAST_SEGMENTS: usize = 6;
+pub(super) const LEAST_SHARE: f64 = 0.85;
 /// Largest scatter of the map that is found, g, and by that of the identity.
 const LARGEST_FOUND: f64 = 0.06;
 const LARGEST_RATIO: f64 = 0.6;
@@ -125,12 +128,20 @@ pub(super) struct Row {
     of: Vec<f64>,
     /// Scatter as recorded, without that: what spins about itself has a force that is mostly no gravity.
     wanders: f64,
+    /// Beginning and end of the segment.
+    span: (Nanos, Nanos),
 }
 
 impl Row {
     /// Scatter as recorded, g.
     pub(super) fn as_recorded(&self) -> f64 {
         self.of.first().map_or(0.0, |s| s.sqrt())
+    }
+
+    /// Evidence for a hypothesis against the identity.
+    pub(super) fn evidence(&self, h: usize) -> f64 {
+        let of = |h: usize| self.of.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
+        evidence(of(0), of(h))
     }
 }
 
@@ -167,7 +178,7 @@ impl Residuals {
             .zip(BANK.iter())
             .enumerate()
             .map(|(h, ((normal, slope), hypothesis))| {
-                if !judged(h) {
+                if !judged(h) && as_recorded < UNUSUAL {
                     return as_recorded;
                 }
                 let found = segment.scatter::<3>(&hypothesis.map, &[], &Vector3::zeros());
@@ -184,7 +195,11 @@ impl Residuals {
                 s + missing * missing
             })
             .collect();
-        Row { of, wanders }
+        Row {
+            of,
+            wanders,
+            span: segment.span,
+        }
     }
 }
 
@@ -238,42 +253,87 @@ impl Evidence {
         let judged = |h: usize| is_whole || sums[h] > HOPELESS;
         let row = self.residuals.push(segment, judged);
         for (h, sum) in self.sums.iter_mut().enumerate() {
-            *sum += evidence_of(&row, h);
+            *sum += row.evidence(h);
         }
         self.rows.push_back(row);
         if self.rows.len() > MEMORY
             && let Some(oldest) = self.rows.pop_front()
         {
             for (h, sum) in self.sums.iter_mut().enumerate() {
-                *sum -= evidence_of(&oldest, h);
+                *sum -= oldest.evidence(h);
             }
         }
     }
 
+    /// Rows, the oldest first, with beginning and end of their segments.
+    pub(super) fn rows(&self) -> impl Iterator<Item = (Nanos, Nanos, &Row)> {
+        self.rows.iter().map(|row| (row.span.0, row.span.1, row))
+    }
+
+    /// Whether gravity stands still as recorded from this row on.
+    pub(super) fn is_still_from(&self, cut: usize) -> bool {
+        let scatters = self.rows.iter().skip(cut).map(|row| &row.wanders);
+        median_scatter(scatters) <= LARGEST_FOUND_SHAKEN
+    }
+
     /// Verdict by now; `None` where nothing may be said.
     pub(super) fn verdict(&self) -> Option<Verdict> {
-        let best = self.sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if self.rows.len() < LEAST_SEGMENTS || best < LEAST_EVIDENCE || !best.is_finite() {
+        self.verdict_from(0, &self.sums)
+    }
+
+    /// Verdict by the last segments alone, and their first, where a map explains those and not the ones before.
+    pub(super) fn later(&self) -> Option<(usize, Verdict)> {
+        let (mut cut, mut most) = (0, f64::NEG_INFINITY);
+        for h in 1..MAPS {
+            let (mut sum, mut least, mut from) = (0.0, 0.0, 0);
+            for (n, row) in self.rows.iter().enumerate() {
+                sum += row.evidence(h);
+                if sum < least {
+                    (least, from) = (sum, n + 1);
+                }
+            }
+            if sum - least > most {
+                (most, cut) = (sum - least, from);
+            }
+        }
+        if most < LEAST_EVIDENCE {
             return None;
         }
-        let near = self.near(best);
-        let chosen = self.simplest(&near)?;
+        let mut sums = vec![0.0; HYPOTHESES];
+        for row in self.rows.iter().skip(cut) {
+            for (h, sum) in sums.iter_mut().enumerate() {
+                *sum += row.evidence(h);
+            }
+        }
+        Some((cut, self.verdict_from(cut, &sums)?))
+    }
+
+    /// Verdict by the rows from this one on, whose evidence is `sums`.
+    fn verdict_from(&self, from: usize, sums: &[f64]) -> Option<Verdict> {
+        let best = sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let count = self.rows.len().saturating_sub(from);
+        if count < LEAST_SEGMENTS || best < LEAST_EVIDENCE || !best.is_finite() {
+            return None;
+        }
+        let near = near(sums, best);
+        let chosen = simplest(sums, &near)?;
         let telling: Vec<&Row> = self
             .rows
             .iter()
-            .filter(|row| evidence_of(row, chosen).abs() > TELLING)
+            .skip(from)
+            .filter(|row| row.evidence(chosen).abs() > TELLING)
             .collect();
         if telling.len() < LEAST_SEGMENTS {
             return None;
         }
         let agree = telling
             .iter()
-            .filter(|row| evidence_of(row, chosen) > 0.0)
+            .filter(|row| row.evidence(chosen) > 0.0)
             .count();
         let scatter_of = |h: usize| median_scatter(telling.iter().filter_map(|row| row.of.get(h)));
         let found = scatter_of(chosen);
         let share = agree as f64 / telling.len() as f64;
-        let (evidence, nothing) = (self.sums[chosen], self.sums[MAPS]);
+        let (evidence, nothing) = (sums[chosen], sums[MAPS]);
         let has_peak = evidence - nothing >= (0.15 * evidence).max(4.0);
         let wanders = median_scatter(telling.iter().map(|row| &row.wanders));
         let identity = if has_peak { scatter_of(0) } else { wanders };
@@ -303,44 +363,43 @@ impl Evidence {
             segments: telling.len(),
         })
     }
-
-    /// Hypotheses about as good as the best.
-    fn near(&self, best: f64) -> Vec<usize> {
-        let least = best - (0.05 * best).max(2.0);
-        let sums = self.sums.iter().enumerate();
-        sums.filter(|(_, sum)| **sum >= least)
-            .map(|(h, _)| h)
-            .collect()
-    }
-
-    /// The simplest of them; of factors the best there is.
-    fn simplest(&self, near: &[usize]) -> Option<usize> {
-        let order = |a: &usize, b: &usize| {
-            let cost = |h: usize| {
-                BANK.get(h)
-                    .map_or(f64::INFINITY, |hypothesis| hypothesis.cost)
-            };
-            let by_cost = cost(*a).total_cmp(&cost(*b));
-            by_cost.then_with(|| self.sums[*b].total_cmp(&self.sums[*a]))
-        };
-        let chosen = near.iter().copied().min_by(order)?;
-        if chosen < MAPS {
-            return Some(chosen);
-        }
-        let mut best = MAPS;
-        for h in MAPS..self.sums.len() {
-            if self.sums[h] > self.sums[best] {
-                best = h;
-            }
-        }
-        Some(best)
-    }
 }
 
-/// Evidence of a segment for a hypothesis against the identity.
-fn evidence_of(row: &Row, h: usize) -> f64 {
-    let of = |h: usize| row.of.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
-    (of(0) / of(h)).ln().clamp(-CLIP, CLIP)
+/// Hypotheses about as good as the best.
+fn near(sums: &[f64], best: f64) -> Vec<usize> {
+    let least = best - (0.05 * best).max(2.0);
+    let sums = sums.iter().enumerate();
+    sums.filter(|(_, sum)| **sum >= least)
+        .map(|(h, _)| h)
+        .collect()
+}
+
+/// The simplest of them; of factors the best there is.
+fn simplest(sums: &[f64], near: &[usize]) -> Option<usize> {
+    let order = |a: &usize, b: &usize| {
+        let cost = |h: usize| {
+            BANK.get(h)
+                .map_or(f64::INFINITY, |hypothesis| hypothesis.cost)
+        };
+        let by_cost = cost(*a).total_cmp(&cost(*b));
+        by_cost.then_with(|| sums[*b].total_cmp(&sums[*a]))
+    };
+    let chosen = near.iter().copied().min_by(order)?;
+    if chosen < MAPS {
+        return Some(chosen);
+    }
+    let mut best = MAPS;
+    for h in MAPS..sums.len() {
+        if sums[h] > sums[best] {
+            best = h;
+        }
+    }
+    Some(best)
+}
+
+/// Evidence of a segment for a map under which gravity scatters by `found` against one under which it does by `other`.
+pub(super) fn evidence(other: f64, found: f64) -> f64 {
+    (other / found).ln().clamp(-CLIP, CLIP)
 }
 
 /// Median of some scatters, g.

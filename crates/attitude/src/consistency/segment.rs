@@ -6,6 +6,7 @@
 //! The derivation is in `docs/theory/consistency.md`.
 
 use super::blocks::Block;
+use crate::record::Nanos;
 use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, Vector3};
 use std::f64::consts::PI;
 
@@ -46,6 +47,8 @@ struct Piece {
 #[derive(Clone, Debug)]
 pub(super) struct Segment {
     pieces: Vec<Piece>,
+    /// Beginning and end.
+    pub(super) span: (Nanos, Nanos),
     /// Sigma of what is left of the bias, rad/s.
     pub(super) bias_sigma: f64,
 }
@@ -96,12 +99,23 @@ impl Segment {
             |block: &Block| 0.5 * (block.start.secs_since(origin) + block.end.secs_since(origin));
         let middles: Vec<f64> = blocks.iter().map(middle).collect();
         (0..WINDOWS).for_each(|k| weigh(&mut pieces, &middles, k));
-        Segment { pieces, bias_sigma }
+        Segment {
+            pieces,
+            span: (origin, blocks.last().map_or(origin, |block| block.end)),
+            bias_sigma,
+        }
     }
 
     /// Whether the gyro turned, or the force changed, enough to say something.
     pub(super) fn moves(&self) -> bool {
         let turned: f64 = self.pieces.iter().map(|piece| piece.angle.norm()).sum();
+        let scatter = self.force_scatter();
+        let is_believed = turned < MOST && scatter * scatter < MOST;
+        is_believed && (turned > LEAST_TURN || scatter > LEAST_SCATTER)
+    }
+
+    /// Scatter of the means of the force in the body, g.
+    pub(super) fn force_scatter(&self) -> f64 {
         let mean_of = |k: usize| {
             let pieces = self.pieces.iter();
             pieces.fold(Vector3::zeros(), |sum, piece| {
@@ -111,8 +125,7 @@ impl Segment {
         let means: [Vector3<f64>; WINDOWS] = std::array::from_fn(mean_of);
         let mean = means.iter().sum::<Vector3<f64>>() / WINDOWS as f64;
         let squares: f64 = means.iter().map(|m| (m - mean).norm_squared()).sum();
-        let is_believed = turned < MOST && squares < MOST;
-        is_believed && (turned > LEAST_TURN || (squares / WINDOWS as f64).sqrt() > LEAST_SCATTER)
+        (squares / WINDOWS as f64).sqrt()
     }
 
     /// Scatter of gravity where the true rate is `map` times the recorded one and `bias` (rad/s as recorded); `p` is

@@ -227,3 +227,43 @@ fn hostile_readings_are_passed_over_and_memory_stays_bounded() {
     watch(&none, &Matrix3::identity(), &mut dead);
     assert_eq!(dead.disagreement(), None);
 }
+
+/// A stream whose maps change at a reading.
+fn changed(samples: &[Sample], from: &Matrix3<f64>, at: usize, to: &Matrix3<f64>) -> Consistency {
+    let mut consistency = Consistency::default();
+    for (n, sample) in samples.iter().enumerate() {
+        let map = if n < at { from } else { to };
+        consistency.push(&Reading {
+            stamp: Nanos(n as i64 * 20_000_000),
+            gyro: Measured::Rate(BodyRate(map * sample.rate)),
+            force: sample.force,
+        });
+    }
+    consistency
+}
+
+#[test]
+fn axes_that_change_half_way_are_named_with_the_moment_and_those_of_a_whole_stream_are_not() {
+    let identity = Matrix3::identity();
+    let swapped = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let circled = Matrix3::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
+    let reversed = diagonal(-1.0, 1.0, 1.0);
+    for walk in [0.0, 2.0] {
+        let samples = simulate(3000, walk);
+        for (map, name) in [(swapped, "YXZ"), (circled, "YZX"), (reversed, "xYZ")] {
+            for (from, to) in [(identity, map), (map, identity)] {
+                let change = changed(&samples, &from, 1500, &to).axes_change();
+                let change =
+                    change.unwrap_or_else(|| panic!("{name} {walk}: {}", from == identity));
+                assert_eq!(change.map.to_string(), name);
+                assert_eq!(change.is_first_right, from == identity);
+                let off = change.at().secs_since(Nanos(30_000_000_000));
+                assert!(off.abs() < 2.5, "{name} {walk}: {off}");
+            }
+            let whole = watched(&samples, &map);
+            assert!(whole.disagreement().is_some() && whole.axes_change().is_none());
+        }
+        let sound = watched(&samples, &identity);
+        assert!(sound.agrees() && sound.axes_change().is_none());
+    }
+}

@@ -6,16 +6,17 @@
 use super::samples::{self, Seen};
 use super::{Finding, Severity, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
-use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_UNIT_CHANGE, MIXED};
+use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_UNIT_CHANGE, MIXED};
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::{Clock, ClockSpeed, GyroUnit, SpeedPass};
+use strapd_attitude::consistency::Consistency;
 use strapd_attitude::estimate::{EstimationSettings, Estimator, Meaning, Prepared, speed_message};
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 12] = [
+const LASTING: [&str; 13] = [
     "gyro-axes",
     "gyro-scale",
     "gyro-against-gravity",
@@ -28,6 +29,7 @@ const LASTING: [&str; 12] = [
     MIXED,
     GYRO_UNIT_CHANGE,
     ACCEL_UNIT_CHANGE,
+    GYRO_AXES_CHANGE,
 ];
 /// Codes of those about gyro and gravity.
 const OF_GYRO: [&str; 3] = ["gyro-axes", "gyro-scale", "gyro-against-gravity"];
@@ -223,8 +225,11 @@ impl SensorWatch {
         now.extend(empty.map(field_empty));
         let gyro = estimator.consistency();
         let resolved = &self.looked.resolved;
-        now.extend(gyro.and_then(|gyro| sensors::disagreement((gyro, plan, resolved))));
-        let is_sound = gyro.is_none_or(|gyro| gyro.disagreement().is_none());
+        let first = estimator.conditioning().first;
+        let changed = gyro.and_then(|gyro| stream::axes_changed(gyro, plan, first, true));
+        let disagrees = || sensors::disagreement((gyro?, plan, resolved));
+        now.extend(changed.or_else(disagrees));
+        let is_sound = gyro.is_none_or(Consistency::agrees);
         if let Some(field) = estimator.field_consistency()
             && is_sound
             && frozen.is_none()
@@ -247,7 +252,7 @@ impl SensorWatch {
         LiveFindings {
             now,
             lasting,
-            is_gyro_sound: gyro.is_some_and(strapd_attitude::consistency::Consistency::is_sound),
+            is_gyro_sound: gyro.is_some_and(Consistency::is_sound),
         }
     }
 }

@@ -126,11 +126,13 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         out.push(no_reference(references));
     }
     out.extend(orientation::of_run(summary));
-    out.extend(noted.gyro.and_then(sensors::disagreement));
+    let changed = noted.gyro.and_then(|(gyro, plan, _)| {
+        stream::axes_changed(gyro, plan, noted.conditioning.first, false)
+    });
+    let disagrees = || noted.gyro.and_then(sensors::disagreement);
+    out.extend(changed.or_else(disagrees));
     // A gyro that is wrong against gravity turns against the field, too: the gyro is cured first.
-    let is_gyro_sound = noted
-        .gyro
-        .is_none_or(|(gyro, ..)| gyro.disagreement().is_none());
+    let is_gyro_sound = noted.gyro.is_none_or(|(gyro, ..)| gyro.agrees());
     if let Some((field, plan)) = noted.field.filter(|_| is_gyro_sound) {
         out.extend(magnetometer::finding(field, plan));
     }

@@ -70,6 +70,23 @@ fn of_axes(
     plan: &EstimationSettings,
 ) -> Finding {
     let names = map.to_string();
+    Finding::new(
+        Severity::Error,
+        AXES,
+        format!(
+            "gyro and accelerometer disagree: the true rate {}",
+            in_words(&map, decided)
+        ),
+    )
+    .with("map", names)
+    .with("scatter_cured_g", found.cured)
+    .advise(tried(found.recorded, found.cured, "the gyro's axes mapped"))
+    .help([GYRO_AXES.to(map.after(plan.gyro_axes))])
+}
+
+/// Axes whose place is decided, in words.
+pub(super) fn in_words(map: &AxisMap, decided: [bool; 3]) -> String {
+    let names = map.to_string();
     let turned: Vec<String> = ["x", "y", "z"]
         .into_iter()
         .zip(names.chars())
@@ -86,18 +103,7 @@ fn of_axes(
             )
         })
         .collect();
-    Finding::new(
-        Severity::Error,
-        AXES,
-        format!(
-            "gyro and accelerometer disagree: the true rate {}",
-            turned.join(", ")
-        ),
-    )
-    .with("map", names)
-    .with("scatter_cured_g", found.cured)
-    .advise(tried(found.recorded, found.cured, "the gyro's axes mapped"))
-    .help([GYRO_AXES.to(map.after(plan.gyro_axes))])
+    turned.join(", ")
 }
 
 fn of_scale(

@@ -1,13 +1,15 @@
-//! Evidence that a stream is no single sensor in one unit -> findings: two that take turns, a unit that changes. Pure.
+//! Evidence that a stream is no single sensor in one unit -> findings: two that take turns, a unit or axes that change. Pure.
 //!
 //! Apart from the counts of a run because the advice depends on who reads it: a recording is split, a sender is mended.
 
-use super::{Finding, Severity};
-use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_UNIT_CHANGE, MIXED};
+use super::{Finding, Severity, sensors};
+use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_UNIT_CHANGE, MIXED};
 use crate::summary::significant;
 use strapd_attitude::condition::{ACCEL_UNITS, Apart, GYRO_UNITS, Mixture, Report, UnitChange};
+use strapd_attitude::consistency::Consistency;
+use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::record::Nanos;
-use strapd_attitude::setting::{COLUMNS, GYRO_UNIT, START, TOPIC, UNTIL, WHERE};
+use strapd_attitude::setting::{COLUMNS, GYRO_AXES, GYRO_UNIT, START, TOPIC, UNTIL, WHERE};
 
 /// Findings about gyro and gravity that these explain, beside those of a misread sensor.
 const EXPLAINED: [&str; 2] = ["gyro-against-gravity", "unit-against-gravity"];
@@ -37,7 +39,8 @@ pub(crate) fn find(report: &Report, is_live: bool) -> Vec<Finding> {
 
 /// Leaves out what two sensors, or a change of the gyro's unit, explain.
 pub(super) fn settle(found: &mut Vec<Finding>) {
-    let is_cause = |f: &Finding| [MIXED, GYRO_UNIT_CHANGE].contains(&f.code);
+    let causes = [MIXED, GYRO_UNIT_CHANGE, GYRO_AXES_CHANGE];
+    let is_cause = |f: &Finding| causes.contains(&f.code);
     if found.iter().any(is_cause) {
         found.retain(|f| !f.is_misread() && !EXPLAINED.contains(&f.code));
     }
@@ -140,4 +143,46 @@ fn advised(found: Finding, (change, at): (&UnitChange, f64), is_live: bool) -> F
         Some(true) => found.help([before]).help([behind, GYRO_UNIT.to("UNIT")]),
         Some(false) => found.help([before, GYRO_UNIT.to("UNIT")]).help([behind]),
     }
+}
+
+/// Axes of the gyro that are others from one moment on; `first`: stamp of the stream's first sample.
+pub(super) fn axes_changed(
+    gyro: &Consistency,
+    plan: &EstimationSettings,
+    first: Option<Nanos>,
+    is_live: bool,
+) -> Option<Finding> {
+    let change = gyro.axes_change()?;
+    let since = |at: Nanos| first.map_or(0.0, |first| at.secs_since(first));
+    let at = since(change.at());
+    let words = sensors::in_words(&change.map, change.decided);
+    let what = match change.is_first_right {
+        true => format!(
+            "the gyro's axes change about {at:.0} s after the start: from there on the true rate {words}"
+        ),
+        false => format!(
+            "the gyro's axes change about {at:.0} s after the start: until there the true rate {words}, then as recorded"
+        ),
+    };
+    let finding = Finding::new(Severity::Error, GYRO_AXES_CHANGE, what)
+        .with("at_s", at)
+        .with("map", change.map.to_string())
+        .with("is_first_right", change.is_first_right)
+        .with("segments_before", change.segments.0)
+        .with("segments_behind", change.segments.1);
+    if is_live {
+        return Some(finding.advise("the attitude is wrong on one side of it: mend the sender, which was restarted with other axes, and reset the attitude"));
+    }
+    let (before, behind) = change.between;
+    let (before, behind) = (since(before.min(behind)), since(behind.max(before)));
+    let before = UNTIL.to(format!("{before:.1}"));
+    let behind = START.to(format!("{behind:.1}"));
+    let axes = GYRO_AXES.to(change.map.after(plan.gyro_axes));
+    let finding = finding.advise(
+        "the attitude is wrong on one side of it: take each part by itself, with its own axes",
+    );
+    Some(match change.is_first_right {
+        true => finding.help([before]).help([behind, axes]),
+        false => finding.help([before, axes]).help([behind]),
+    })
 }
