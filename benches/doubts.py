@@ -2,14 +2,18 @@
 """Faults put into recordings and simulated motions -> which of them `strapd replay` names, as a Markdown table.
 
     cargo build
-    benches/doubts.py SCRATCH_DIR [RECORDING...]      STRAPD=target/debug/strapd SEEDS=1,2
+    benches/doubts.py SCRATCH_DIR [RECORDING...]             STRAPD=target/debug/strapd SEEDS=1,2
+    benches/doubts.py --spikes SCRATCH_DIR RECORDING...      in files, and as a live stream takes them
+    benches/doubts.py --clocks SCRATCH_DIR RECORDING...
 
 Each recording is cut to its first SECS; motions are those of `strapd simulate` with the noise of a consumer sensor. A
 fault is found where a finding of its code is there; the row `none` counts errors and warnings of the data as they are.
+Of spikes the samples are counted that are repaired, and those that are though they were none.
 """
 import csv
 import json
 import os
+import random
 import subprocess
 import sys
 
@@ -75,6 +79,14 @@ def two(rows):
     ]
 
 
+def axes_half_way(change):
+    return each(lambda n, row, count: row if n < count // 2 else (row[0], change(*row[1]), row[2]))
+
+
+def axes_first_half(change):
+    return each(lambda n, row, count: row if n >= count // 2 else (row[0], change(*row[1]), row[2]))
+
+
 DEG = 57.29577951
 FAULTS = {
     "none": (lambda rows: rows, ()),
@@ -85,6 +97,10 @@ FAULTS = {
     "deg/s from half way": (half_way(DEG, 1), ("gyro-unit-change",)),
     "rad/s in deg/s from half way": (half_way(1 / DEG, 1), ("gyro-unit-change",)),
     "g from half way": (half_way(1, 1 / 9.80665), ("accel-unit-change",)),
+    "x and y exchanged from half way": (axes_half_way(lambda x, y, z: [y, x, z]), ("gyro-axes-change",)),
+    "x reversed from half way": (axes_half_way(lambda x, y, z: [-x, y, z]), ("gyro-axes-change",)),
+    "x and y exchanged until half way": (axes_first_half(lambda x, y, z: [y, x, z]), ("gyro-axes-change",)),
+    "all in a circle from half way": (axes_half_way(lambda x, y, z: [z, x, y]), ("gyro-axes-change",)),
     "spikes of 3 rad/s": (spikes(3), ("spikes",)),
     "spikes of 8 rad/s": (spikes(8), ("spikes",)),
     "spikes of 30 rad/s": (spikes(30), ("spikes",)),
@@ -93,21 +109,98 @@ FAULTS = {
 }
 
 
-def findings(rows, scratch):
+def replayed(rows, scratch, *flags, stamps=None):
+    """Topics of the summary; `stamps`: those of the sensor, where the rows' are the recorder's."""
     path = os.path.join(scratch, "fault.csv")
     with open(path, "w", encoding="utf-8") as file:
-        file.write("stamp_ns," + ",".join(GYRO + FORCE) + "\n")
-        for t, w, f in rows:
-            file.write(f"{t}," + ",".join(f"{v:.9g}" for v in (*w, *f)) + "\n")
-    said = run("replay", "--aid", "auto", "--json", path)
-    topics = json.loads(said)["topics"] if said else []
-    return {f["code"]: f for topic in topics for f in topic["findings"] if f["severity"] != "note"}
+        file.write("stamp_ns," + ("log_ns," if stamps else "") + ",".join(GYRO + FORCE) + "\n")
+        for n, (t, w, f) in enumerate(rows):
+            time = f"{stamps[n]},{t}" if stamps else t
+            file.write(f"{time}," + ",".join(f"{v:.9g}" for v in (*w, *f)) + "\n")
+    said = run("replay", "--aid", "auto", "--json", *flags, path)
+    return json.loads(said)["topics"] if said else []
+
+
+def findings(rows, scratch, notes=False, **how):
+    topics = replayed(rows, scratch, **how)
+    found = {f["code"]: f for topic in topics for f in topic["findings"] if notes or f["severity"] != "note"}
+    if any(topic["counter_wraps"] for topic in topics):
+        # No finding of a recording: it goes on.
+        found["counter-wraps"] = {"severity": "note"}
+    return found
+
+
+def spiked(rows, size, length, seed=1):
+    """Twenty spikes of so many samples, at random times and in random directions; and how many samples that are."""
+    draw = random.Random(seed)
+    rows = [(t, list(w), f) for t, w, f in rows]
+    gap = (len(rows) - 200) // 20
+    for k in range(20):
+        at = 100 + k * gap + draw.randrange(gap - 40)
+        axis, sign = draw.randrange(3), draw.choice((-1, 1))
+        for row in rows[at : at + length]:
+            row[1][axis] += sign * size
+    return rows, 20 * length
+
+
+def spike_table(scratch, data):
+    def repaired(rows, *flags):
+        return sum(topic["repaired_spikes"] for topic in replayed(rows, scratch, *flags))
+
+    print("| spikes, rad/s | samples | repaired in files | live |\n|---|---|---|---|")
+    none = [sum(repaired(rows, *flags) for rows in data.values()) for flags in ((), ("--method", "commit"))]
+    print(f"| none | 0 | {none[0]} | {none[1]} |", flush=True)
+    for length in (1, 2, 3):
+        for size in (0.5, 1, 3, 8, 30):
+            made, file, live = 0, 0, 0
+            for rows in data.values():
+                faulty, count = spiked(rows, size, length)
+                made += count
+                file += repaired(faulty)
+                live += repaired(faulty, "--method", "commit")
+            print(f"| {size} | {length} | {100 * file / made:.0f} % | {100 * live / made:.0f} % |", flush=True)
+
+
+def by_stamp(change):
+    """Stamps of the sensor by those of the recorder, both from 0."""
+    return lambda rows: [rows[0][0] + change(t - rows[0][0]) for t, *_ in rows]
+
+
+def in_batches(rows):
+    return [rows[min(n // 8 * 8 + 7, len(rows) - 1)][0] + n % 8 * 20_000 for n in range(len(rows))]
+
+
+CLOCKS = {
+    "none": (None, ()),
+    "half the speed": (by_stamp(lambda t: t // 2), ("clock-speed",)),
+    "twice the speed": (by_stamp(lambda t: t * 2), ("clock-speed",)),
+    "10 % fast": (by_stamp(lambda t: t * 11 // 10), ("clock-speed",)),
+    "set ahead by 0.3 s": (by_stamp(lambda t: t + 300_000_000 * (t > 3e10)), ("clock-set",)),
+    "set back by 0.3 s": (by_stamp(lambda t: t - 300_000_000 * (t > 3e10)), ("clock-set",)),
+    "set ahead by an hour": (by_stamp(lambda t: t + 3600 * 10**9 * (t > 3e10)), ("clock-set",)),
+    "wraps at 32 bits of us": (
+        lambda rows: [((t - rows[0][0]) // 1000 + 2**32 - 20_000_000) % 2**32 * 1000 for t, *_ in rows],
+        ("counter-wraps",),
+    ),
+    "counts in 100 ms": (by_stamp(lambda t: t // 10**8 * 10**8), ("coarse-stamps",)),
+    "batches of 8": (in_batches, ("batches",)),
+}
+
+
+def clock_table(scratch, data):
+    print("| clock of the stamps | found | not found in | errors of another name |\n|---|---|---|---|")
+    for name, (change, codes) in CLOCKS.items():
+        table_row(name, codes, data, lambda rows, change=change: findings(rows, scratch, True, stamps=change and change(rows)))
 
 
 def main():
-    scratch, *recordings = sys.argv[1:]
+    tables = {"--spikes": spike_table, "--clocks": clock_table}
+    table = tables.get(sys.argv[1])
+    scratch, *recordings = sys.argv[2 if table else 1 :]
     os.makedirs(scratch, exist_ok=True)
     data = {os.path.basename(path): rows_of(run("cat", "--format", "csv", path)) for path in recordings}
+    if table:
+        return table(scratch, data)
     for motion, seed in ((motion, seed) for motion in MOTIONS for seed in SEEDS):
         path = os.path.join(scratch, f"{motion}-{seed}.csv")
         kind = ["--rate-hz", str(HZ), "--duration", str(SECS), "--noise", "consumer_imu", "--seed", seed]
@@ -116,17 +209,21 @@ def main():
             data[f"{motion} {seed}"] = rows_of(file.read())
     print("| fault | found | not found in | errors of another name |\n|---|---|---|---|")
     for name, (change, codes) in FAULTS.items():
-        missed, others = [], {}
-        for of, rows in data.items():
-            found = findings(change(rows), scratch)
-            if not found.keys() & set(codes):
-                missed.append(of)
-            for code, finding in found.items():
-                if code not in codes and finding["severity"] == "error":
-                    others.setdefault(code, []).append(of)
-        said = "; ".join(f"`{code}`: {', '.join(of)}" for code, of in others.items())
-        count = f"{len(data) - len(missed)} of {len(data)}" if codes else "-"
-        print(f"| {name} | {count} | {', '.join(missed) if codes else ''} | {said} |", flush=True)
+        table_row(name, codes, data, lambda rows, change=change: findings(change(rows), scratch))
+
+
+def table_row(name, codes, data, found_in):
+    missed, others = [], {}
+    for of, rows in data.items():
+        found = found_in(rows)
+        if not found.keys() & set(codes):
+            missed.append(of)
+        for code, finding in found.items():
+            if code not in codes and finding["severity"] == "error":
+                others.setdefault(code, []).append(of)
+    said = "; ".join(f"`{code}`: {', '.join(of)}" for code, of in others.items())
+    count = f"{len(data) - len(missed)} of {len(data)}" if codes else "-"
+    print(f"| {name} | {count} | {', '.join(missed) if codes else ''} | {said} |", flush=True)
 
 
 if __name__ == "__main__":
