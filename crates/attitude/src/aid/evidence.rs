@@ -1,16 +1,19 @@
 //! Knowledge of a sensor after a run with wide priors -> how many times likelier it is of one class than of another. Pure.
 //!
-//! Apart from the filter because nobody asks for it on the way. What the run told of scale, axes and accelerometer is
+//! Apart from the filter because it is asked for seldom. What the run told of scale, axes and accelerometer is
 //! a Gaussian: its posterior less its prior. The likelihood of what was measured under any other prior of these numbers
 //! follows from it in closed form, as if the filter had run with that.
 
 use super::covariance::{CROSS, FORCE_BIAS, SCALE};
-use super::filter::{COLOURED, Filter};
+use super::filter::{COLOURED, Filter, WIDE};
+use super::other_class::{ClassDoubt, NUMBERS, OtherClass};
 use super::settings::Settings;
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use nalgebra::{Cholesky, Const, Matrix3, SMatrix, SVector};
 
-/// Scale, axes and accelerometer's bias.
-const NUMBERS: usize = 9;
+/// Corrections after which the class is weighed again: 10 s.
+const OFTEN: u64 = 100;
+/// Probability of a class that adds nothing any more.
+const NEGLIGIBLE: f64 = 1e-3;
 type Matrix = SMatrix<f64, NUMBERS, NUMBERS>;
 type Vector = SVector<f64, NUMBERS>;
 
@@ -58,5 +61,81 @@ impl Filter {
             Some(of(&wide)? - of(&prior(narrow))?)
         });
         log.filter(|log| log.is_finite()).unwrap_or(0.0)
+    }
+}
+
+impl Filter {
+    /// Lets the attitude be less sure by a class that the sensor may be of instead.
+    pub(crate) fn may_be_of(&mut self, other: OtherClass) {
+        self.derived.doubt = Some(ClassDoubt {
+            other,
+            weights: [0.0; NUMBERS],
+        });
+        self.forget_class();
+    }
+
+    /// Covariance that the attitude has more by the other class, where that can be; rad^2, earth axes.
+    pub(super) fn by_other_class(&self) -> Option<Matrix3<f64>> {
+        let doubt = self.derived.doubt.as_ref();
+        let doubt = doubt.filter(|doubt| doubt.weights != [0.0; NUMBERS]);
+        Some(doubt?.of(&self.state.covariance))
+    }
+
+    /// Forgets what was learned of the class.
+    pub(super) fn forget_class(&mut self) {
+        let log = self.derived.doubt.and_then(|doubt| doubt.other.log);
+        self.state.class_log = log.unwrap_or(0.0);
+        self.weigh_classes();
+    }
+
+    /// Finds by what was learned which class the sensor is of, where it is time.
+    pub(super) fn find_class(&mut self) {
+        let Some(doubt) = &self.derived.doubt else {
+            return;
+        };
+        if doubt.other.log.is_none() && self.state.report.updates.is_multiple_of(OFTEN) {
+            self.state.class_log = -self.likelier_than(&self.priors_of(&doubt.other));
+            self.weigh_classes();
+        }
+    }
+
+    /// Derives from the state what the other class adds.
+    pub(super) fn weigh_classes(&mut self) {
+        if let Some(mut doubt) = self.derived.doubt {
+            let probability = self.other_class_probability();
+            doubt.weights = match probability {
+                ..NEGLIGIBLE => [0.0; NUMBERS],
+                _ => self.weights(&self.priors_of(&doubt.other), probability),
+            };
+            self.derived.doubt = Some(doubt);
+        }
+    }
+
+    /// Probability that the sensor is of the other class.
+    pub(crate) fn other_class_probability(&self) -> f64 {
+        1.0 / (1.0 + (-self.state.class_log).exp())
+    }
+
+    fn priors_of(&self, other: &OtherClass) -> Settings {
+        Settings {
+            scale_prior: other.scale_prior,
+            cross_prior: other.cross_prior,
+            force_bias_prior: other.force_bias_prior,
+            ..self.settings
+        }
+    }
+
+    fn weights(&self, other: &Settings, probability: f64) -> [f64; NUMBERS] {
+        let own = &self.settings;
+        let gyro = |prior: f64| if self.state.is_widened { WIDE } else { prior };
+        let of = |own: f64, other: f64| {
+            let own = own * own;
+            probability * (other * other - own).max(0.0) / (own * own)
+        };
+        const { assert!(CROSS == SCALE + 3 && FORCE_BIAS == SCALE + 6) };
+        let scale = of(gyro(own.scale_prior), other.scale_prior);
+        let cross = of(gyro(own.cross_prior), other.cross_prior);
+        let force = of(own.force_bias_prior, other.force_bias_prior);
+        std::array::from_fn(|i| [scale, cross, force][i / 3])
     }
 }

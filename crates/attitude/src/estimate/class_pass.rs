@@ -110,7 +110,7 @@ impl ClassPass {
         self.0.len() < MANY
     }
 
-    /// Which class the samples tell; `None` where they cannot be weighed.
+    /// Class that the samples tell; `None` where they cannot be weighed.
     pub(super) fn told(self, run: &Run<'_>) -> Option<ToldClass> {
         let aiding = run.aiding.uncalibrated(run.plan, run.resolved);
         let evidence = self.weigh(run, &aiding)?;

@@ -121,7 +121,7 @@ impl PriorScale {
 /// Class that a sensor may be of instead, where neither anybody nor the data said which: sigma covers both.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OtherClass {
-    /// Its priors, in the unit of [`Settings::looseness`].
+    /// Priors of it, in the unit of [`Settings::looseness`].
     pub looseness: PriorScale,
     /// Probability that the sensor is of it.
     pub probability: f64,

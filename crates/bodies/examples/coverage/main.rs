@@ -59,7 +59,7 @@ fn plan(name: &str) -> Result<EstimationSettings, Failure> {
     Ok(plan)
 }
 
-/// What a file that can be read twice tells before its first sample is taken.
+/// Findings of a file that can be read twice, before its first sample is taken.
 fn looked_through(
     plan: &EstimationSettings,
     meaning: &Meaning,
