@@ -39,7 +39,8 @@ fn without_noise_an_attitude_keeps_its_bits_and_its_sigma_is_not_known() {
     let log = root().join("fixtures/xsens_mti.mcap");
     std::fs::copy(log, at.join("log.mcap")).unwrap();
     let rows = |flags: &str| {
-        let ran = strapd(at, &format!("replay log.mcap -o out.csv --force {flags}")).done();
+        let ran = strapd(at, &format!("replay log.mcap -o out.csv --force {flags}"));
+        ran.done();
         let rows = std::fs::read_to_string(at.join("out.csv")).unwrap();
         let cells = |row: &str, from: usize, to: usize| {
             let cells: Vec<&str> = row.split(',').skip(from).take(to - from).collect();
@@ -52,7 +53,7 @@ fn without_noise_an_attitude_keeps_its_bits_and_its_sigma_is_not_known() {
                 .collect()
         };
         let [attitudes, sigmas]: [Vec<String>; 2] = [part(0, 11), part(11, 14)];
-        (attitudes, sigmas, ran.err.clone())
+        (attitudes, sigmas, format!("{}{}", ran.out, ran.err))
     };
     let (with, _, _) = rows("--aid none");
     let (without, sigmas, said) = rows("--aid none --noise none");

@@ -3,9 +3,11 @@
 
 use super::client::Client;
 use super::daemon::{Daemon, Process, TCP, eventually, listening};
+use super::runs::Fed;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::path::Path;
+use strapd_attitude::estimate::{Aid, EstimationSettings};
 
 /// A sample: rad/s, m/s^2, uT.
 #[derive(Clone, Copy)]
@@ -299,4 +301,54 @@ fn what_was_found_outlives_a_reset_and_a_restart_but_not_the_setting_that_cures_
     std::fs::write(&path, kept).unwrap();
     let process = started(&path, &["--aid", "auto", "--gyro-axes", "YXZ"]);
     assert!(!after(&process).contains(&"gyro-axes".to_owned()));
+}
+
+/// Attitudes of a daemon that is sent these, and its findings.
+fn attitudes(aid: Aid, samples: &[Sample]) -> (Vec<Value>, Vec<String>) {
+    let plan = EstimationSettings {
+        aid,
+        ..EstimationSettings::default()
+    };
+    let mut daemon = Fed::of(&plan);
+    let text = lines("imu0", samples, 0);
+    let got = daemon.lines(text.lines().map(str::to_owned));
+    let status: Value = serde_json::from_slice(&daemon.hub.status()).unwrap();
+    let attitudes = got.attitudes.iter();
+    let attitudes = attitudes.map(|a| serde_json::from_str(a).unwrap());
+    (attitudes.collect(), codes(&status, "imu0"))
+}
+
+fn rotation(attitude: &Value) -> UnitQuaternion<f64> {
+    let [w, x, y, z] = ["w", "x", "y", "z"].map(|c| attitude["q"][c].as_f64().unwrap());
+    UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
+}
+
+#[test]
+fn a_spike_in_a_stream_is_taken_back_with_the_sample_that_shows_it() {
+    let good = good();
+    for aid in [Aid::None, Aid::Auto] {
+        let (clean, none) = attitudes(aid, &good);
+        assert!(none.is_empty(), "{none:?}");
+        for (size, count) in [(8.0, 1), (-30.0, 1), (30.0, 2)] {
+            let mut spiked = good.clone();
+            spiked[1200..1200 + count]
+                .iter_mut()
+                .for_each(|s| s.gyro[1] += size);
+            let (found, said) = attitudes(aid, &spiked);
+            assert_eq!(said, ["spikes"], "{size}");
+            let off = |n: usize| {
+                rotation(&found[n])
+                    .angle_to(&rotation(&clean[n]))
+                    .to_degrees()
+            };
+            assert!(off(1200) > 1.0, "it had left");
+            let is_marked =
+                |a: &&Value| a["status"].as_array().unwrap().contains(&"repaired".into());
+            let first = found.iter().position(|a| is_marked(&a)).unwrap();
+            assert!(first - 1200 <= count + 1 && found.iter().filter(is_marked).count() == 1);
+            // The line between its neighbours is not quite what the body did.
+            let worst = (first..found.len()).map(off).fold(0.0, f64::max);
+            assert!(worst < 0.05, "{aid:?} {size}: {worst} degrees");
+        }
+    }
 }

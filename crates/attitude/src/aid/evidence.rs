@@ -83,17 +83,15 @@ impl Filter {
 
     /// Forgets what was learned of the class.
     pub(super) fn forget_class(&mut self) {
-        let log = self.derived.doubt.and_then(|doubt| doubt.other.log);
-        self.state.class_log = log.unwrap_or(0.0);
+        self.state.class_log = 0.0;
         self.weigh_classes();
     }
 
     /// Finds by what was learned which class the sensor is of, where it is time.
     pub(super) fn find_class(&mut self) {
-        let Some(doubt) = &self.derived.doubt else {
-            return;
-        };
-        if doubt.other.log.is_none() && self.state.report.updates.is_multiple_of(OFTEN) {
+        if let Some(doubt) = &self.derived.doubt
+            && self.state.report.updates.is_multiple_of(OFTEN)
+        {
             self.state.class_log = -self.likelier_than(&self.priors_of(&doubt.other));
             self.weigh_classes();
         }

@@ -18,8 +18,6 @@ pub struct OtherClass {
     pub cross_prior: f64,
     /// Prior sigma of the accelerometer's bias, m/s^2.
     pub force_bias_prior: f64,
-    /// Logarithm of how many times likelier the sensor is of it; `None`: what the filter learns tells it on the way.
-    pub log: Option<f64>,
 }
 
 /// Other class, and what it adds.

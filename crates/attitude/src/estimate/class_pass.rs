@@ -63,15 +63,6 @@ pub(super) fn is_open(plan: &EstimationSettings) -> bool {
     plan.noise.is_by_data() && plan.calibration.is_none() && plan.aid != Aid::None
 }
 
-/// Class of a sensor by its data.
-#[derive(Debug)]
-pub(super) enum ToldClass {
-    /// Clearly one that nobody calibrated: what corrects the attitude with the priors of that, and why.
-    Uncalibrated(Aiding, Diagnostic),
-    /// Not clear: the logarithm of how many times likelier it is that nobody calibrated it.
-    Open(f64),
-}
-
 /// Samples kept until they can be weighed.
 #[derive(Debug, Default)]
 pub(super) struct ClassPass(Vec<StoredSample>);
@@ -110,17 +101,13 @@ impl ClassPass {
         self.0.len() < MANY
     }
 
-    /// Class that the samples tell; `None` where they cannot be weighed.
-    pub(super) fn told(self, run: &Run<'_>) -> Option<ToldClass> {
+    /// Aiding with the priors of a sensor that nobody calibrated, and why it is taken for one, where
+    /// that is clear.
+    pub(super) fn told(self, run: &Run<'_>) -> Option<(Aiding, Diagnostic)> {
         let aiding = run.aiding.uncalibrated(run.plan, run.resolved);
         let evidence = self.weigh(run, &aiding)?;
-        Some(
-            if evidence.log > CLEAR && evidence.is_within(&aiding.settings) {
-                ToldClass::Uncalibrated(aiding, evidence.said())
-            } else {
-                ToldClass::Open(evidence.log)
-            },
-        )
+        let is_clear = evidence.log > CLEAR && evidence.is_within(&aiding.settings);
+        is_clear.then(|| (aiding, evidence.said()))
     }
 
     /// Weighs the samples by a filter of the wide class.

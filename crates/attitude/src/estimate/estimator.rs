@@ -192,7 +192,6 @@ impl Estimator {
                         scale_prior: wide.scale_prior,
                         cross_prior: wide.cross_prior,
                         force_bias_prior: wide.force_bias_prior,
-                        log: prepared.class_log,
                     }));
                     if plan.smooth {
                         let heading = match aiding.start {

@@ -13,7 +13,7 @@ use self::kind::decide_kind;
 use self::rates::{clipped_at, decide_truncation, looks_for_truncation};
 use self::stamps::{decide_clock, decide_stamps};
 use super::aiding::Aiding;
-use super::class_pass::{self, ClassPass, ToldClass};
+use super::class_pass::{self, ClassPass};
 use super::clock_pass::ClockPass;
 use super::first_pass::{FEW, MANY, RestPass};
 use super::meaning::Meaning;
@@ -73,8 +73,6 @@ pub struct Prepared {
     pub has_arrival: bool,
     /// Whether the sensor may as well be one that nobody calibrated: nobody said it, and no data did.
     pub is_class_open: bool,
-    /// Logarithm of how many times likelier it is one; `None`: not weighed.
-    pub class_log: Option<f64>,
     /// Aiding, if something corrects the attitude.
     pub aiding: Option<Aiding>,
     /// Step in which the driver cut the rates, rad/s, where that is undone.
@@ -378,7 +376,6 @@ impl Preparation {
             stamps,
             has_arrival: true,
             is_class_open: class_pass::is_open(&plan),
-            class_log: None,
             batches: clocks.batches,
             coarse: clocks.coarse,
             warnings,
@@ -396,15 +393,11 @@ impl Preparation {
                 aiding,
             })
         });
-        match told {
-            Some(ToldClass::Uncalibrated(aiding, why)) => {
-                prepared.noise = Noise::preset(UNCALIBRATED);
-                prepared.aiding = Some(aiding);
-                prepared.warnings.push(why);
-                prepared.is_class_open = false;
-            }
-            Some(ToldClass::Open(log)) => prepared.class_log = Some(log),
-            None => {}
+        if let Some((aiding, why)) = told {
+            prepared.noise = Noise::preset(UNCALIBRATED);
+            prepared.aiding = Some(aiding);
+            prepared.warnings.push(why);
+            prepared.is_class_open = false;
         }
         Ok(prepared)
     }
@@ -485,7 +478,6 @@ pub fn at_once(
         sample_kind: resolved.kind_choice(),
         has_arrival: false,
         is_class_open: class_pass::is_open(plan),
-        class_log: None,
         batches: None,
         coarse: None,
         noise: plan.noise.taken(),

@@ -32,6 +32,9 @@ use strapd_attitude::setting::{
 };
 use strapd_attitude::worlds::EARTH_RATE;
 
+/// Text of a sigma where no noise was stated.
+const NO_SIGMA: &str = "not known: no noise was stated";
+
 /// Summary of one topic: of a log, or of samples that still come.
 #[derive(Clone, Debug, Default)]
 pub struct TopicSummary {
@@ -449,10 +452,15 @@ impl TopicSummary {
         self.drift.to_degrees() * 3600.0
     }
 
+    /// Whether no noise was stated: zeros are no certainty.
+    fn has_no_sigma(&self) -> bool {
+        self.has_attitude() && self.final_sigma == [0.0; 3] && self.drift == 0.0
+    }
+
     /// Text of the sigma at the end, and what it is of: that of what corrects the attitude, else of the drift.
     fn sigma_text(&self) -> String {
-        if self.has_attitude() && self.final_sigma == [0.0; 3] && self.drift_deg_per_h() == 0.0 {
-            return "not known: no noise was stated".to_owned();
+        if self.has_no_sigma() {
+            return NO_SIGMA.to_owned();
         }
         let [x, y, z] = self.final_sigma.map(|v| significant(v.to_degrees(), 2));
         let of = match (self.smoothing(), &self.aided) {

@@ -1,6 +1,6 @@
 //! A topic's summary -> the few lines of it that everybody reads: what was done, and how good it is. Pure.
 
-use super::TopicSummary;
+use super::{NO_SIGMA, TopicSummary};
 use crate::finding::Severity;
 use crate::summary::against::against_text;
 use crate::summary::significant;
@@ -79,14 +79,17 @@ impl TopicSummary {
             most if most >= 0.3 => 1,
             _ => 3,
         };
+        let attitude =
+            format!("roll {roll:.digits$}, pitch {pitch:.digits$}, yaw {yaw:.digits$} deg");
+        if self.has_no_sigma() {
+            return format!("{attitude}; sigma {NO_SIGMA}");
+        }
         let [x, y, z] = sigma.map(|v| significant(v, 2));
         let holds = match self.sigma_holds() {
             true => "",
             false => " DOES NOT HOLD: see warning",
         };
-        format!(
-            "roll {roll:.digits$}, pitch {pitch:.digits$}, yaw {yaw:.digits$} deg; sigma {x}, {y}, {z} deg about x, y, z{holds}"
-        )
+        format!("{attitude}; sigma {x}, {y}, {z} deg about x, y, z{holds}")
     }
 
     /// The worst of the warnings, and how many more there are.
