@@ -124,7 +124,7 @@ pub struct Consistency {
     settled: Option<Verdict>,
     /// Segments in which gravity stood still, for what comes later.
     sound: Sound,
-    /// Axes that are others from one moment on, how often in a row they were seen, and whether it is said.
+    /// Axes that are others from one moment on, and how often in a row they were seen.
     change: Option<AxesChange>,
     change_held: usize,
     /// Whether it runs beside a stream without an end: it keeps no segment that does not scatter, and closes a bank

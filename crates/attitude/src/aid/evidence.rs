@@ -4,10 +4,9 @@
 //! a Gaussian: its posterior less its prior. The likelihood of what was measured under any other prior of these numbers
 //! follows from it in closed form, as if the filter had run with that.
 
-use super::covariance::{CROSS, FORCE_BIAS, SCALE};
+use super::covariance::SCALE;
 use super::filter::{COLOURED, Filter, WIDE};
 use super::other_class::{ClassDoubt, NUMBERS, OtherClass};
-use super::settings::Settings;
 use nalgebra::{Cholesky, Const, Matrix3, SMatrix, SVector};
 
 /// Corrections after which the class is weighed again: 10 s.
@@ -18,15 +17,9 @@ type Matrix = SMatrix<f64, NUMBERS, NUMBERS>;
 type Vector = SVector<f64, NUMBERS>;
 
 /// Inverse covariance of the numbers beforehand.
-fn prior(settings: &Settings) -> Matrix {
-    let Settings {
-        scale_prior,
-        cross_prior,
-        force_bias_prior,
-        ..
-    } = settings;
-    let sigmas = [scale_prior, cross_prior, force_bias_prior];
-    Matrix::from_diagonal(&Vector::from_fn(|i, _| sigmas[i / 3].powi(-2)))
+fn prior(class: &OtherClass) -> Matrix {
+    let sigmas = class.sigmas();
+    Matrix::from_diagonal(&Vector::from_fn(|i, _| sigmas[i].powi(-2)))
 }
 
 /// Logarithm of the likelihood of what told `information` and `told`, but for a constant, where `prior` is right.
@@ -42,29 +35,27 @@ fn likelihood(information: &Matrix, told: &Vector, prior: &Matrix) -> Option<f64
 
 impl Filter {
     /// Logarithm of how many times likelier what was measured is of a sensor with the priors of this filter than of one
-    /// with those of `narrow`; 0 where nothing can be said.
-    pub(crate) fn likelier_than(&self, narrow: &Settings) -> f64 {
-        let state = |i: usize| [SCALE, CROSS, FORCE_BIAS][i / 3] + i % 3;
+    /// with those of `other`; 0 where nothing can be said.
+    pub(crate) fn likelier_than(&self, other: &OtherClass) -> f64 {
         let numbers = [
             self.calibration().scale,
             self.calibration().cross,
             self.calibration().force_bias,
         ];
         let found = Vector::from_fn(|i, _| numbers[i / 3][i % 3]);
-        let covariance = Matrix::from_fn(|i, j| self.state.covariance.between(state(i), state(j)));
-        let wide = prior(self.settings());
+        let covariance =
+            Matrix::from_fn(|i, j| self.state.covariance.between(SCALE + i, SCALE + j));
+        let own = prior(&OtherClass::of(self.settings()));
         let log = covariance.try_inverse().and_then(|known| {
             // Accelerations are not white: what was measured tells less than it seems to.
-            let information = (known - wide) / COLOURED;
+            let information = (known - own) / COLOURED;
             let told = known * found / COLOURED;
             let of = |prior: &Matrix| likelihood(&information, &told, prior);
-            Some(of(&wide)? - of(&prior(narrow))?)
+            Some(of(&own)? - of(&prior(other))?)
         });
         log.filter(|log| log.is_finite()).unwrap_or(0.0)
     }
-}
 
-impl Filter {
     /// Lets the attitude be less sure by a class that the sensor may be of instead.
     pub(crate) fn may_be_of(&mut self, other: OtherClass) {
         self.derived.doubt = Some(ClassDoubt {
@@ -92,7 +83,7 @@ impl Filter {
         if let Some(doubt) = &self.derived.doubt
             && self.state.report.updates.is_multiple_of(OFTEN)
         {
-            self.state.class_log = -self.likelier_than(&self.priors_of(&doubt.other));
+            self.state.class_log = -self.likelier_than(&doubt.other);
             self.weigh_classes();
         }
     }
@@ -103,7 +94,7 @@ impl Filter {
             let probability = self.other_class_probability();
             doubt.weights = match probability {
                 ..NEGLIGIBLE => [0.0; NUMBERS],
-                _ => self.weights(&self.priors_of(&doubt.other), probability),
+                _ => self.weights(&doubt.other, probability),
             };
             self.derived.doubt = Some(doubt);
         }
@@ -114,26 +105,12 @@ impl Filter {
         1.0 / (1.0 + (-self.state.class_log).exp())
     }
 
-    fn priors_of(&self, other: &OtherClass) -> Settings {
-        Settings {
-            scale_prior: other.scale_prior,
-            cross_prior: other.cross_prior,
-            force_bias_prior: other.force_bias_prior,
-            ..self.settings
+    fn weights(&self, other: &OtherClass, probability: f64) -> [f64; NUMBERS] {
+        let mut own = OtherClass::of(&self.settings);
+        if self.state.is_widened {
+            (own.scale_prior, own.cross_prior) = (WIDE, WIDE);
         }
-    }
-
-    fn weights(&self, other: &Settings, probability: f64) -> [f64; NUMBERS] {
-        let own = &self.settings;
-        let gyro = |prior: f64| if self.state.is_widened { WIDE } else { prior };
-        let of = |own: f64, other: f64| {
-            let own = own * own;
-            probability * (other * other - own).max(0.0) / (own * own)
-        };
-        const { assert!(CROSS == SCALE + 3 && FORCE_BIAS == SCALE + 6) };
-        let scale = of(gyro(own.scale_prior), other.scale_prior);
-        let cross = of(gyro(own.cross_prior), other.cross_prior);
-        let force = of(own.force_bias_prior, other.force_bias_prior);
-        std::array::from_fn(|i| [scale, cross, force][i / 3])
+        let [own, other] = [own, *other].map(|class| class.sigmas().map(|sigma| sigma * sigma));
+        std::array::from_fn(|i| probability * (other[i] - own[i]).max(0.0) / (own[i] * own[i]))
     }
 }

@@ -3,7 +3,8 @@
 //! Apart from the covariance because the filter corrects by the priors of one class alone: this is what it would be
 //! off by if those were not the sensor's (Schmidt's consider covariance), as far as nothing tells which they are.
 
-use super::covariance::{Covariance, SCALE};
+use super::covariance::{CROSS, Covariance, FORCE_BIAS, SCALE};
+use super::settings::Settings;
 use nalgebra::Matrix3;
 
 /// Scale, axes and accelerometer's bias, as they follow each other among the states.
@@ -26,6 +27,24 @@ pub(super) struct ClassDoubt {
     pub(super) other: OtherClass,
     /// Variance that each number may have more, over the square of the one it was given.
     pub(super) weights: [f64; NUMBERS],
+}
+
+impl OtherClass {
+    /// Priors of a filter with these settings.
+    pub(crate) fn of(settings: &Settings) -> OtherClass {
+        OtherClass {
+            scale_prior: settings.scale_prior,
+            cross_prior: settings.cross_prior,
+            force_bias_prior: settings.force_bias_prior,
+        }
+    }
+
+    /// Prior sigma of each of the numbers.
+    pub(super) fn sigmas(&self) -> [f64; NUMBERS] {
+        const { assert!(CROSS == SCALE + 3 && FORCE_BIAS == SCALE + 6) };
+        let sigmas = [self.scale_prior, self.cross_prior, self.force_bias_prior];
+        std::array::from_fn(|i| sigmas[i / 3])
+    }
 }
 
 impl ClassDoubt {

@@ -8,7 +8,7 @@ use super::first_pass::MANY;
 use super::meaning::{Meaning, STANDARD_GRAVITY};
 use super::noise_presets::{NOISE_PRESETS, UNCALIBRATED};
 use super::plan::{Aid, EstimationSettings};
-use crate::aid::{AidedPropagator, Calibration, Settings};
+use crate::aid::{AidedPropagator, Calibration, OtherClass, Settings};
 use crate::condition::{self, Clock, CoarseClock, Conditioner};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
@@ -150,7 +150,7 @@ impl ClassPass {
         rests.take(&attitudes);
         let filter = aided.filter();
         let off_at_rest = rests.farthest();
-        let by_motion = filter.likelier_than(&run.aiding.settings);
+        let by_motion = filter.likelier_than(&OtherClass::of(&run.aiding.settings));
         Some(Evidence {
             log: by_motion + off_at_rest.map_or(0.0, by_length),
             found: *filter.calibration(),

@@ -188,11 +188,7 @@ impl Estimator {
                         let noise = Noise::preset(UNCALIBRATED);
                         (looseness(&wide, &noise), wide)
                     });
-                    let aided = aided.or_of(wide.map(|(_, wide)| OtherClass {
-                        scale_prior: wide.scale_prior,
-                        cross_prior: wide.cross_prior,
-                        force_bias_prior: wide.force_bias_prior,
-                    }));
+                    let aided = aided.or_of(wide.map(|(_, wide)| OtherClass::of(&wide)));
                     if plan.smooth {
                         let heading = match aiding.start {
                             aid::Start::Level | aid::Start::LevelBy(_) => None,

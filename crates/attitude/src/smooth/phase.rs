@@ -405,6 +405,7 @@ mod tests {
             cost: 0.0,
         };
         let known = |sigma: f64| Marginal {
+            by_class: Matrix3::zeros(),
             turn: Matrix3::identity() * sigma.to_radians().powi(2),
             bias: [0.0; 3],
         };

@@ -98,7 +98,8 @@ impl Smoothed {
         rate: &Vector3<f64>,
         section: usize,
     ) -> Matrix3<f64> {
-        let (a, b) = (&self.marginals[from].turn, &self.marginals[to].turn);
+        let turn = |node: usize| self.marginals[node].turn + self.marginals[node].by_class;
+        let (a, b) = (turn(from), turn(to));
         let mut covariance = a * (1.0 - share) + b * share;
         let has_north = self
             .sections

@@ -36,6 +36,8 @@ pub(super) struct Solution {
 pub(super) struct Marginal {
     pub(super) turn: Matrix3<f64>,
     pub(super) bias: [f64; 3],
+    /// Covariance that the rotation has more by a class that the sensor may be of instead, rad^2.
+    pub(super) by_class: Matrix3<f64>,
 }
 
 const fn at(i: usize, j: usize) -> usize {
@@ -233,10 +235,10 @@ impl<const W: usize> Solver<W> {
             }
             p = now;
             x = cross;
-            let more = doubt.map_or_else(Matrix3::zeros, |doubt| doubted(&x, doubt));
             marginals.push(Marginal {
-                turn: more + Matrix3::from_fn(|i, j| 0.5 * (p[i][j] + p[j][i])),
+                turn: Matrix3::from_fn(|i, j| 0.5 * (p[i][j] + p[j][i])),
                 bias: [9, 10, 11].map(|i| p[i][i]),
+                by_class: doubt.map_or_else(Matrix3::zeros, |doubt| doubted(&x, doubt)),
             });
         }
         marginals.reverse();

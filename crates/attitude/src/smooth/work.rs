@@ -339,7 +339,11 @@ impl Work {
         let marginals = filter
             .covariances
             .iter()
-            .map(|turn| Marginal { turn: *turn, bias })
+            .map(|turn| Marginal {
+                turn: *turn,
+                bias,
+                by_class: Matrix3::zeros(),
+            })
             .collect();
         let trust = FieldTrust::new(self.settings.heading_reference, self.spacing);
         let nodes = filter.nodes.into_iter().map(|q| (q, filter.bias));
