@@ -76,10 +76,7 @@ pub fn estimate<'py>(
     )?;
     let (columns, done) = py.detach(|| {
         let mut signals = Signals::new();
-        let mut columns = Columns::with_room(samples.len());
-        if plan.noise.is_none() {
-            columns = columns.without_covariance();
-        }
+        let mut columns = Columns::with_room(samples.len(), &plan.noise);
         let done = run(&plan, samples.part(0, samples.len()), |attitudes| {
             columns.extend(attitudes);
             signals.look()

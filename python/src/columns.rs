@@ -5,10 +5,11 @@
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use strapd_attitude::estimate::Noise;
 use strapd_attitude::record::AttitudeSample;
 
 /// Attitudes, a column a quantity.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Columns {
     /// Stamps, ns.
     pub t: Vec<i64>,
@@ -25,21 +26,16 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Makes them with room for so many.
-    pub fn with_room(n: usize) -> Columns {
+    /// Makes them with room for so many attitudes of a gyro of this noise.
+    pub fn with_room(n: usize, noise: &Noise) -> Columns {
         Columns {
             t: Vec::with_capacity(n),
             q: Vec::with_capacity(4 * n),
             rate: Vec::with_capacity(3 * n),
-            cov: Some(Vec::with_capacity(6 * n)),
+            cov: (!noise.is_none()).then(|| Vec::with_capacity(6 * n)),
             status: Vec::with_capacity(n),
             reset: Vec::with_capacity(n),
         }
-    }
-
-    /// The same without a covariance.
-    pub fn without_covariance(self) -> Columns {
-        Columns { cov: None, ..self }
     }
 
     /// Appends attitudes.

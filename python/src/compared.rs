@@ -32,7 +32,7 @@ pub fn compare<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let align: Align = align
         .parse()
-        .map_err(|e| argument(format!("align: {align:?}: {e}")))?;
+        .map_err(|e| argument(Diagnostic::from(&e).at(format_args!("align: {align:?}"))))?;
     let from = convention("world", world)?;
     let estimate = stamped("a", &t, &q, from)?;
     let reference = stamped("b", &ref_t, &ref_q, convention("ref_world", ref_world)?)?;
@@ -90,7 +90,7 @@ pub fn compare<'py>(
 pub(crate) fn convention(name: &str, world: &str) -> PyResult<Convention> {
     let world: World = world
         .parse()
-        .map_err(|e| argument(format!("{name}: {e}")))?;
+        .map_err(|e| argument(Diagnostic::from(&e).at(name)))?;
     Ok(world.convention().unwrap_or(Convention::EnuFlu))
 }
 

@@ -27,7 +27,7 @@ pub fn relative<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let heading: RelativeHeading = heading
         .parse()
-        .map_err(|e| argument(format!("heading: {heading:?}: {e}")))?;
+        .map_err(|e: Diagnostic| argument(e.at(format_args!("heading: {heading:?}"))))?;
     let from = [convention("world", world)?, convention("second_world", second_world)?];
     let first = stamped("a", &t, &q, from[0])?;
     let second = stamped("b", &second_t, &second_q, from[1])?;

@@ -185,7 +185,7 @@ impl Live {
     ) -> PyResult<Bound<'py, PyDict>> {
         self.check_open(py)?;
         let samples = Samples::new(&gyr, &t, (acc.as_ref(), mag.as_ref()), None, dt.as_ref())?;
-        let mut columns = Columns::with_room(samples.len());
+        let mut columns = Columns::with_room(samples.len(), &self.plan.noise);
         if let Some(first) = samples.part(0, 1).next() {
             self.running(&first)
                 .map_err(|what| refusal::run(py, "refused", what))?;
@@ -216,7 +216,7 @@ impl Live {
     fn finish_rows<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.check_open(py)?;
         self.is_closed = true;
-        let mut columns = Columns::with_room(0);
+        let mut columns = Columns::with_room(0, &self.plan.noise);
         if let Some((estimator, _)) = &mut self.running {
             let rest = estimator.finish(&Sequential);
             self.last = rest.last().copied().or(self.last);
@@ -244,7 +244,7 @@ impl Live {
 
     /// The newest attitude as columns of one row, or none.
     fn last_rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let mut columns = Columns::with_room(0);
+        let mut columns = Columns::with_room(0, &self.plan.noise);
         columns.extend(self.last.as_slice());
         columns.into_dict(py)
     }

@@ -75,6 +75,7 @@ pub fn replay<'py>(
     let (request, threads) = request
         .and_then(|request| Ok((request, threads?.unwrap_or(0))))
         .map_err(|error| raised(py, &error))?;
+    let noise = request.plan.noise.clone();
     let (done, said) = errand::run(py, move |stopped| {
         noted(|| run(&request, threads, stopped.clone()))
     })?;
@@ -84,7 +85,10 @@ pub fn replay<'py>(
     let mut columns = columns.into_iter();
     for topic in &summary.topics {
         // A topic without a single attitude has begun nothing.
-        let columns = columns.next().unwrap_or_default().into_dict(py)?;
+        let columns = columns
+            .next()
+            .unwrap_or_else(|| Columns::with_room(0, &noise))
+            .into_dict(py)?;
         topics.append((&topic.topic, columns))?;
         calibrations.append(calibration::write(py, &topic.calibration)?)?;
     }
@@ -104,10 +108,15 @@ fn run(
     let pool = pool(threads)?;
     let kept = Arc::new(Mutex::new(Vec::<Columns>::new()));
     let taken = kept.clone();
+    let noise = request.plan.noise.clone();
     let summary = request.each_attitude(&pool, move |streams, topic, samples| {
         let mut all = taken.lock().unwrap_or_else(PoisonError::into_inner);
         if all.is_empty() {
-            all.extend(streams.iter().map(|_| Columns::with_room(FIRST_ROOM)));
+            all.extend(
+                streams
+                    .iter()
+                    .map(|_| Columns::with_room(FIRST_ROOM, &noise)),
+            );
         }
         if let Some(columns) = all.get_mut(topic) {
             columns.extend(samples);

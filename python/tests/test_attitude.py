@@ -48,6 +48,8 @@ def test_without_a_covariance_the_attitude_has_the_same_bits() -> None:
     same_bits(whole.rate, bare.rate)
     assert np.isfinite(whole.sigma).all() and np.isnan(bare.sigma).all() and bare.covariance.shape == (500, 3, 3)
     assert np.isnan(bare[10:20].sigma).all()
+    live = strapd.Estimator(aid="none", noise="none")
+    assert np.isnan(live.push(GYR, t=T).sigma).all()
     with pytest.raises(ValueError, match="covariance=False"):
         strapd.integrate(GYR, t=T, covariance=False, noise="consumer")
 
