@@ -53,7 +53,8 @@ def main():
     pathlib.Path(given.out).mkdir(parents=True, exist_ok=True)
     told = all_of(logs, given.out, given.workers, given.start)
     for log, attitudes, lost, why in told:
-        print(f"{log}: {attitudes} attitudes{f', lost {lost} samples' if lost else ''}{f' ({why})' if why else ''}")
+        reason = f" ({' '.join(why.split())})" if why else ""
+        print(f"{log}: {attitudes} attitudes{f', lost {lost} samples' if lost else ''}{reason}")
     sys.exit(1 if any(not attitudes for _, attitudes, _, _ in told) else 0)
 
 

@@ -257,6 +257,11 @@ impl HingeFit {
                 break;
             }
         }
+        // Half a turn at most in the first window; whatever follows goes on from it.
+        let turns = TAU * (offsets[0].0 / TAU).round();
+        for (offset, _) in &mut offsets {
+            *offset -= turns;
+        }
         HingeFit::judged(&windows, &offsets, total)
     }
 

@@ -182,6 +182,9 @@ fn errors(case: Case) -> [f64; 2] {
         error - TAU * (error / TAU).round()
     });
     let squares: f64 = offsets.clone().map(|e| e * e).sum();
+    // A person reads -57 degrees and not 303.
+    let first = found.rows.first().unwrap().heading_offset;
+    assert!(first.abs() <= TAU / 2.0 + 0.01, "{first}");
     [
         rms(angles),
         (squares / found.rows.len() as f64).sqrt().to_degrees(),
