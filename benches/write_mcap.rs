@@ -33,6 +33,7 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
                     noise(0.1),
                     9.8 + noise(0.1),
                 ))),
+                linear_acceleration: None,
                 covariance: AttitudeCovariance::from_sigma(Vector3::repeat(
                     1e-5 * (k as f64).sqrt(),
                 )),

@@ -8,6 +8,9 @@ use pyo3::types::PyDict;
 use strapd_attitude::estimate::Noise;
 use strapd_attitude::record::AttitudeSample;
 
+/// Numbers of an acceleration: three components and six of a covariance.
+const NUMBERS: usize = 9;
+
 /// Attitudes, a column a quantity.
 #[derive(Debug)]
 pub struct Columns {
@@ -19,6 +22,9 @@ pub struct Columns {
     pub rate: Vec<f64>,
     /// Upper triangle of the covariance, body axes, rad^2: xx, xy, xz, yy, yz, zz; `None` where none is carried.
     pub cov: Option<Vec<f64>>,
+    /// Acceleration without gravity, body axes, m/s^2, and the upper triangle of its covariance, where the first attitude
+    /// or a later one carries it; NaN of those that do not.
+    pub linear_acceleration: Vec<f64>,
     /// Bits of the status.
     pub status: Vec<u16>,
     /// Resets and holds so far.
@@ -33,6 +39,7 @@ impl Columns {
             q: Vec::with_capacity(4 * n),
             rate: Vec::with_capacity(3 * n),
             cov: (!noise.is_none()).then(|| Vec::with_capacity(6 * n)),
+            linear_acceleration: Vec::new(),
             status: Vec::with_capacity(n),
             reset: Vec::with_capacity(n),
         }
@@ -48,6 +55,19 @@ impl Columns {
         if let Some(cov) = &mut self.cov {
             cov.extend(all().flat_map(|sample| sample.covariance.upper()));
         }
+        if all().any(|sample| sample.linear_acceleration.is_some()) {
+            let before = NUMBERS * self.status.len();
+            self.linear_acceleration.resize(before, f64::NAN);
+            for sample in samples {
+                match &sample.linear_acceleration {
+                    Some(of) => {
+                        self.linear_acceleration.extend(of.body.as_vector());
+                        self.linear_acceleration.extend(of.covariance);
+                    }
+                    None => self.linear_acceleration.extend([f64::NAN; NUMBERS]),
+                }
+            }
+        }
         self.status.extend(all().map(|sample| sample.status.0));
         self.reset.extend(all().map(|sample| sample.reset_count));
     }
@@ -60,6 +80,11 @@ impl Columns {
         dict.set_item("rate", rows(py, self.rate, 3)?)?;
         if let Some(cov) = self.cov {
             dict.set_item("cov", rows(py, cov, 6)?)?;
+        }
+        if !self.linear_acceleration.is_empty() {
+            let mut accelerations = self.linear_acceleration;
+            accelerations.resize(NUMBERS * self.status.len(), f64::NAN);
+            dict.set_item("linear_acceleration", rows(py, accelerations, NUMBERS)?)?;
         }
         dict.set_item("status", self.status.into_pyarray(py))?;
         dict.set_item("reset", self.reset.into_pyarray(py))?;

@@ -129,3 +129,27 @@ def test_comparisons_take_pairs_and_say_what_is_missing() -> None:
     with pytest.raises(strapd.Error, match="no instant in common") as error:
         strapd.compare(ATT, (ATT.t + 10**12, ATT.q))
     assert error.value.kind == "no_match"
+
+
+def test_acceleration_without_gravity_is_that_of_the_body() -> None:
+    exact = strapd.simulate("hand", rate_hz=100, duration=30, seed=2)
+    att = strapd.estimate(exact.gyr, exact.acc, t=exact.t, kind="rate", linear_acceleration=True)
+    # The force in the world by SciPy, less what holds a body up; the sensor has no errors.
+    world = att.rotation().apply(exact.acc) - [0.0, 0.0, 9.81]
+    assert np.abs(att.world_linear_acceleration - world).max() < 0.05
+    assert np.allclose(att.rotation().apply(att.linear_acceleration), att.world_linear_acceleration, atol=1e-9)
+    assert att.linear_acceleration_sigma.shape == (len(att), 3) and (att.linear_acceleration_sigma > 0).all()
+    assert att[10:20].linear_acceleration.shape == (10, 3)
+    assert {"linear_acceleration_x", "world_linear_acceleration_z"} <= set(att.to_dict())
+    smooth = strapd.estimate(exact.gyr, exact.acc, t=exact.t, kind="rate", smooth=True, linear_acceleration=True)
+    assert np.isfinite(smooth.linear_acceleration).all()
+    live = strapd.Estimator(aid="gravity", kind="rate", linear_acceleration=True)
+    rows = live.push(exact.gyr, exact.acc, t=exact.t)
+    assert np.isfinite(rows.linear_acceleration).all() and pickle.loads(pickle.dumps(rows)).linear_acceleration.shape == rows.rate.shape
+    plain = strapd.estimate(exact.gyr, exact.acc, t=exact.t, kind="rate")
+    same_bits(plain.q, att.q)
+    with pytest.raises(AttributeError, match="linear_acceleration=True"):
+        plain.linear_acceleration
+    assert "linear_acceleration_x" not in plain.to_dict()
+    with pytest.raises(ValueError, match="no vertical"):
+        strapd.integrate(exact.gyr, t=exact.t, linear_acceleration=True)

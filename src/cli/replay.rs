@@ -25,11 +25,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::EstimationSettings;
+use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::{BIAS, SMOOTH};
 use strapd_recording::Selection;
 use strapd_recording::Source;
 use strapd_recording::decode::Options as DecodeOptions;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::instants::Instants;
 
 /// Turn recorded gyro samples into attitude.
 #[derive(Args, Debug)]
@@ -89,6 +91,15 @@ pub struct Replay {
         help_heading = "Output"
     )]
     pub out_rate: Option<f64>,
+    /// Write attitudes at these instants, not at the samples: of the video's `frames`, of the messages of a topic, or of
+    /// a table with a column of stamps
+    #[arg(
+        long,
+        value_name = "FILE|TOPIC|frames",
+        conflicts_with = "out_rate",
+        help_heading = "Output"
+    )]
+    pub at: Option<String>,
     /// Speed: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
     #[arg(
         long,
@@ -353,6 +364,34 @@ impl Replay {
         Ok(Some(Arc::new(track)))
     }
 
+    /// The instants at which attitudes are wanted, if somebody says any.
+    fn read_instants(
+        &self,
+        source: &Source,
+        options: &DecodeOptions,
+        pool: &Pool,
+    ) -> Result<Option<Arc<[Nanos]>>> {
+        let Some(asked) = &self.at else {
+            return Ok(None);
+        };
+        let instants = Instants::named(asked);
+        let path = match (source, &instants) {
+            (Source::File(path), _) => path.clone(),
+            (_, Instants::Table(_)) => PathBuf::new(),
+            _ => {
+                let what =
+                    format!("--at {asked}: the recording is to be a file, which is read twice");
+                let help = "keep it as one, or give a table of instants";
+                return Err(Error::usage(Diagnostic::new(what).help(help)));
+            }
+        };
+        let (read, note) = instants.read(&path, options, pool)?;
+        if let Some(note) = note {
+            tracing::warn!("{note}");
+        }
+        Ok(Some(read.into()))
+    }
+
     /// The run for one log.
     ///
     /// # Errors
@@ -381,6 +420,7 @@ impl Replay {
             _ => Source::parse(log),
         };
         let reference = self.read_reference(pool)?;
+        let instants = self.read_instants(&source, &selection.decode, pool)?;
         let can_rewind = match &source {
             Source::File(path) => path.is_file(),
             Source::Parts(_) => true,
@@ -409,6 +449,7 @@ impl Replay {
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
+            instants,
             speed: served.speed,
             against: match (&self.against_recorded, &reference) {
                 (None, Some(_)) => Some(String::new()),

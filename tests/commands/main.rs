@@ -6,6 +6,7 @@
 )]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod accelerations;
 mod advice;
 mod allan;
 mod bad_input;
@@ -21,6 +22,7 @@ mod folders;
 mod formats;
 mod heading_resets;
 mod increments;
+mod instants;
 mod joined;
 mod joined_formats;
 mod layouts;

@@ -16,7 +16,9 @@ use strapd::sink::{
 };
 use strapd_attitude::frames::In;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
-use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
+use strapd_attitude::record::{
+    AttitudeCovariance, AttitudeSample, LinearAcceleration, Nanos, Status,
+};
 
 mod files;
 
@@ -36,6 +38,7 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
                 rate: BodyRate(Vector3::new(0.6, 0.48, 0.64 + 1e-6 * t.sin())),
                 accel: (k % 7 != 0)
                     .then(|| In::assume(Vector3::new(0.1 * t.cos(), 0.1 * t.sin(), 9.8))),
+                linear_acceleration: None,
                 covariance: AttitudeCovariance::from_sigma(
                     Vector3::new(1e-5, 2e-5, 3e-5) * (1.0 + t),
                 ),
@@ -578,6 +581,10 @@ fn any_sample() -> impl Strategy<Value = AttitudeSample> {
             q_nb: Quaternion::assume_unit(q),
             rate: BodyRate(rate),
             accel: accel.map(In::assume),
+            linear_acceleration: accel.map(|v| LinearAcceleration {
+                body: In::assume(v),
+                covariance: [sigma.x, sigma.y, sigma.z, sigma.x, sigma.y, sigma.z],
+            }),
             covariance: AttitudeCovariance {
                 xx: sigma.x,
                 xy: sigma.y,

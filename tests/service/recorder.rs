@@ -41,6 +41,7 @@ fn attitude(raw: &RawSample) -> AttitudeSample {
         q_nb: Quaternion::assume_unit([(0.5 * x).cos(), (0.5 * x).sin(), 0.0, 0.0]),
         rate: BodyRate(Vector3::new(x, y, z)),
         accel: raw.accel.map(|a| In::assume(Vector3::from(a))),
+        linear_acceleration: None,
         covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-5, 2e-5, 3e-5)),
         status: Status::OK,
         reset_count: 0,

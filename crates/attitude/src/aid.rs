@@ -43,6 +43,7 @@ mod filter;
 mod gravity;
 mod heading;
 mod interval;
+mod linear_acceleration;
 mod memory;
 mod other_class;
 mod plausibility;

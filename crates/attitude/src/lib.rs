@@ -72,6 +72,7 @@ pub mod plausible;
 pub mod propagate;
 pub mod quaternion;
 pub mod record;
+pub mod resample;
 pub mod setting;
 pub mod smooth;
 pub mod worlds;

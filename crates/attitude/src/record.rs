@@ -9,9 +9,11 @@
 
 mod covariance;
 mod declared;
+mod linear_acceleration;
 
 pub use covariance::AttitudeCovariance;
 pub use declared::{AccelUnit, Declared, GyroUnit, TimeUnit};
+pub use linear_acceleration::LinearAcceleration;
 
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::{BodyRate, DeltaAngle, Quaternion};
@@ -337,6 +339,8 @@ pub struct AttitudeSample {
     pub rate: BodyRate,
     /// Specific force, m/s^2, copied through.
     pub accel: Option<In<Body>>,
+    /// Acceleration without gravity, where it is asked for and a specific force goes with the sample.
+    pub linear_acceleration: Option<LinearAcceleration>,
     /// Covariance of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
     pub covariance: AttitudeCovariance,
     /// Observations about it.

@@ -149,6 +149,7 @@ settings! {
     ACCEL_TOPIC = "accel_topic";
     AGAINST_RECORDED = "against_recorded";
     AID = "aid";
+    AT = "at";
     BIAS = "bias";
     BODY = "body";
     CALIBRATION = "calibration";
@@ -167,6 +168,7 @@ settings! {
     IGNORE_COVARIANCE_FLAG = "ignore_covariance_flag";
     INIT = "init";
     JOIN = "join";
+    LINEAR_ACCELERATION = "linear_acceleration";
     LISTEN = "listen";
     MAG_AXES = "mag_axes";
     MAG_HARD_IRON = "mag_hard_iron";

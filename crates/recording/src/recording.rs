@@ -19,6 +19,7 @@
 //! | `line_reader`, `sample_cache` | the samples of lines, sensor by sensor; those of a text, kept for the next walk |
 //! | [`selection`], [`topics`], [`log_topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
+//! | [`instants`] | when attitudes are wanted beside the samples: frames, stamps of a topic, rows |
 //! | `samples`, [`topic_plan`], [`topic_reading`] | how a topic is read, and which messages are its own; all samples that are selected, one topic |
 //! | [`own_output`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
@@ -34,6 +35,7 @@ mod folder;
 pub mod held;
 pub mod incoming;
 pub mod input;
+pub mod instants;
 mod line_input;
 mod line_reader;
 pub mod log_channel;

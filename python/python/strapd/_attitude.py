@@ -65,6 +65,7 @@ class Attitude:
         self.rate = columns["rate"]
         # None where no covariance is carried.
         self._cov: Optional[npt.NDArray[np.float64]] = columns.get("cov")
+        self._acceleration: Optional[npt.NDArray[np.float64]] = columns.get("linear_acceleration")
         self.status = columns["status"]
         self.reset = columns["reset"]
         self.summary = summary
@@ -93,6 +94,32 @@ class Attitude:
     def covariance(self) -> npt.NDArray[np.float64]:
         """(n, 3, 3): of the error as a rotation vector in body axes, rad^2."""
         return self._upper[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+
+    @property
+    def linear_acceleration(self) -> npt.NDArray[np.float64]:
+        """(n, 3): m/s^2 along the body axes, without gravity; NaN where no specific force goes with the sample.
+
+        Asked for by ``linear_acceleration=True``.
+        """
+        return self._accelerations[:, :3]
+
+    @property
+    def linear_acceleration_sigma(self) -> npt.NDArray[np.float64]:
+        """(n, 3): one standard deviation of each component, m/s^2."""
+        return np.sqrt(self._accelerations[:, [3, 6, 8]])
+
+    @property
+    def world_linear_acceleration(self) -> npt.NDArray[np.float64]:
+        """(n, 3): the same acceleration along the axes of the world, m/s^2."""
+        w, xyz = self.q[:, :1], self.q[:, 1:]
+        across = 2.0 * np.cross(xyz, self.linear_acceleration)
+        return self.linear_acceleration + w * across + np.cross(xyz, across)
+
+    @property
+    def _accelerations(self) -> npt.NDArray[np.float64]:
+        if self._acceleration is None:
+            raise AttributeError("no acceleration was asked for, or none can be told\n  help: linear_acceleration=True, and an accelerometer (acc)")
+        return self._acceleration
 
     @property
     def _upper(self) -> npt.NDArray[np.float64]:
@@ -218,6 +245,9 @@ class Attitude:
         columns.update({f"q{axis}": self.q[:, i] for i, axis in enumerate("wxyz")})
         columns.update({f"w{axis}": self.rate[:, i] for i, axis in enumerate("xyz")})
         columns.update({f"sigma_{axis}": sigma[:, i] for i, axis in enumerate("xyz")})
+        if self._acceleration is not None:
+            for name in ("linear_acceleration", "world_linear_acceleration"):
+                columns.update({f"{name}_{axis}": getattr(self, name)[:, i] for i, axis in enumerate("xyz")})
         columns.update(status=self.status, reset=self.reset)
         return columns
 
@@ -288,6 +318,8 @@ class Attitude:
         columns: dict[str, Any] = {"t": self.t[part], "q": self.q[part], "rate": self.rate[part]}
         if self._cov is not None:
             columns["cov"] = self._cov[part]
+        if self._acceleration is not None:
+            columns["linear_acceleration"] = self._acceleration[part]
         columns.update(status=self.status[part], reset=self.reset[part])
         return Attitude(columns, self.summary)
 

@@ -22,6 +22,7 @@ class Settings(TypedDict, total=False):
     stamps: Optional[Literal["auto", "as-recorded"]]
     window: Optional[int]
     order: Union[int, str, None]
+    linear_acceleration: Optional[bool]
     accel_sign: Optional[Literal["specific", "kinematic"]]
     mag_mount: Optional[Vector]
     mag_hard_iron: Optional[float]
@@ -64,6 +65,7 @@ SETTINGS = frozenset(
         "sample_kind",
         "aid",
         "smooth",
+        "linear_acceleration",
         "accel_sign",
         "mag_mount",
         "mag_hard_iron",

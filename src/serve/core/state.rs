@@ -223,6 +223,7 @@ impl Saved {
             q_nb: Quaternion::assume_unit(self.q),
             rate: BodyRate(self.rate.into()),
             accel: None,
+            linear_acceleration: None,
             covariance: AttitudeCovariance::from_upper(self.covariance),
             status: Status::OK,
             reset_count: self.reset,

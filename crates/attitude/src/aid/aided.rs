@@ -84,6 +84,8 @@ pub struct AidedPropagator {
     scratch: Vec<AttitudeSample>,
     /// Innovations, if somebody looks at them.
     innovations: Option<Vec<(Nanos, Innovation)>>,
+    /// Whether attitudes carry the acceleration without gravity.
+    gives_acceleration: bool,
 }
 
 /// State of an [`AidedPropagator`] beside those of its propagator and its filter: what is on its way between them.
@@ -151,6 +153,7 @@ impl AidedPropagator {
             corrected: Vec::new(),
             scratch: Vec::new(),
             innovations: None,
+            gives_acceleration: false,
         })
     }
 
@@ -168,6 +171,18 @@ impl AidedPropagator {
             self.filter.may_be_of(other);
         }
         self
+    }
+
+    /// The same where attitudes carry the acceleration without gravity, of samples that a specific force goes with.
+    #[must_use]
+    pub fn with_linear_acceleration(mut self) -> AidedPropagator {
+        self.gives_acceleration = true;
+        self
+    }
+
+    /// Whether they do.
+    pub(crate) fn gives_acceleration(&self) -> bool {
+        self.gives_acceleration
     }
 
     /// Keeps the innovations of every correction from now on, for [`AidedPropagator::innovations`].
@@ -362,6 +377,11 @@ impl AidedPropagator {
             gyro: sample
                 .gyro
                 .with(applied.corrected(*sample.gyro.as_vector(), sample.own_secs())),
+            // The propagator carries it to the attitude, whatever topic it came by.
+            accel: match self.gives_acceleration {
+                true => force.map(In::assume),
+                false => sample.accel,
+            },
             ..*sample
         }
     }
@@ -396,8 +416,13 @@ impl AidedPropagator {
                     status = status.with(Status::RESET);
                 }
             }
+            let force = sample.accel.filter(|_| self.gives_acceleration);
             let mut told = self.stream.world.told(AttitudeSample {
                 q_nb,
+                linear_acceleration: force.and_then(|force| {
+                    let force = force.as_vector();
+                    self.filter.linear_acceleration(force, &sample.rate.0, &r)
+                }),
                 status: status.with(self.filter.status()),
                 covariance: self.filter.attitude_covariance(&r, &sample.rate.0),
                 ..*sample

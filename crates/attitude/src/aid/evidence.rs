@@ -67,9 +67,13 @@ impl Filter {
 
     /// Covariance that the attitude has more by the other class, where that can be; rad^2, earth axes.
     pub(super) fn by_other_class(&self) -> Option<Matrix3<f64>> {
+        Some(self.open_class()?.of(&self.state.covariance))
+    }
+
+    /// The class that the sensor may be of instead, where that can be.
+    pub(super) fn open_class(&self) -> Option<&ClassDoubt> {
         let doubt = self.derived.doubt.as_ref();
-        let doubt = doubt.filter(|doubt| doubt.weights != [0.0; NUMBERS]);
-        Some(doubt?.of(&self.state.covariance))
+        doubt.filter(|doubt| doubt.weights != [0.0; NUMBERS])
     }
 
     /// Forgets what was learned of the class.

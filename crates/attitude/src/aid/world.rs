@@ -88,6 +88,7 @@ mod tests {
             q_nb: turn * lean,
             rate: BodyRate(Vector3::zeros()),
             accel: None,
+            linear_acceleration: None,
             covariance: AttitudeCovariance::default(),
             status: Status::OK,
             reset_count: 3,

@@ -29,6 +29,7 @@ use crate::diagnostic::Diagnostic;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use crate::smooth::PriorSigmas;
+use crate::worlds::World;
 
 /// Samples at once that memory is kept for.
 const FEW: usize = 8;
@@ -46,6 +47,7 @@ pub struct Estimator {
     beside: Besides,
     /// Auxiliary inputs; `None` where nothing of them is used.
     besides: Option<AuxiliaryInputs>,
+    gives_acceleration: bool,
     /// Watch over the gyro, where somebody wants it; it changes no attitude and is not remembered.
     watch: Option<GyroWatch>,
     /// The same over the magnetometer.
@@ -189,6 +191,10 @@ impl Estimator {
                         (looseness(&wide, &noise), wide)
                     });
                     let aided = aided.or_of(wide.map(|(_, wide)| OtherClass::of(&wide)));
+                    let aided = match plan.linear_acceleration {
+                        true => aided.with_linear_acceleration(),
+                        false => aided,
+                    };
                     if plan.smooth {
                         let heading = match aiding.start {
                             aid::Start::Level | aid::Start::LevelBy(_) => None,
@@ -217,6 +223,7 @@ impl Estimator {
             }
         }
         .map_err(|e| Diagnostic::from(&e))?;
+        let is_level = prepared.world != World::Start || plan.initial == Initial::Gravity;
         Ok(Estimator {
             settings: settings_fingerprint(settings, plan, prepared, &noise),
             conditioner: {
@@ -232,6 +239,8 @@ impl Estimator {
                 world: prepared.world,
                 north: (plan.declination != 0.0 && prepared.aiding.is_some())
                     .then(|| turned_north(plan.declination)),
+                gravity: (plan.linear_acceleration && prepared.aiding.is_none() && is_level)
+                    .then(|| aid::Settings::default().gravity),
             },
             beside: Vec::new(),
             besides: prepared.aiding.map(|aiding| AuxiliaryInputs {
@@ -241,6 +250,7 @@ impl Estimator {
                 has_field: aiding.settings.has_field,
                 force_scale: None,
             }),
+            gives_acceleration: plan.linear_acceleration,
             watch: None,
             magnetometer: None,
             begins_anew: false,
@@ -663,6 +673,17 @@ impl Estimator {
     /// Takes the innovations kept since the last call, each with the stamp of the correction.
     pub fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
         self.integrator.innovations()
+    }
+
+    /// Whether attitudes carry the acceleration without gravity, of samples with a specific force: it was asked for, and
+    /// something tells the vertical.
+    #[must_use]
+    pub fn gives_acceleration(&self) -> bool {
+        let is_corrected = self
+            .integrator
+            .filter()
+            .is_some_and(aid::Filter::is_started);
+        self.gives_acceleration && (is_corrected || self.asked.gravity.is_some())
     }
 
     /// The method, with its window and order.

@@ -2,7 +2,7 @@
 
 use crate::frames::{In, Nav};
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
-use crate::record::AttitudeSample;
+use crate::record::{AttitudeSample, LinearAcceleration};
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
 
@@ -14,6 +14,8 @@ pub(super) struct OutputFrame {
     pub(super) world: World,
     /// True north to the axes of the filter, whose north is magnetic; `None` = the same.
     pub(super) north: Option<Quaternion<Nav, Nav>>,
+    /// Gravity, m/s^2, where the acceleration without it is asked of an attitude that nothing corrects.
+    pub(super) gravity: Option<f64>,
 }
 
 impl OutputFrame {
@@ -25,6 +27,16 @@ impl OutputFrame {
             .convention()
             .filter(|to| *to != Convention::EnuFlu);
         for sample in out {
+            if let Some((force, gravity)) = sample.accel.zip(self.gravity) {
+                let force = force.as_vector();
+                sample.linear_acceleration = Some(LinearAcceleration::at(
+                    &sample.q_nb,
+                    &sample.covariance,
+                    force,
+                    &Vector3::zeros(),
+                    gravity,
+                ));
+            }
             // What a sensor measured late has happened at the stamp already.
             if self.delay != 0.0 {
                 let turn = sample.rate.held_for(self.delay).about_fixed_axis();
@@ -70,6 +82,9 @@ fn relabelled(sample: &AttitudeSample, from: Convention, to: Convention) -> Atti
         accel: sample
             .accel
             .map(|a| In::assume(from.convert_body(to, *a.as_vector()))),
+        linear_acceleration: sample
+            .linear_acceleration
+            .map(|a| a.relabelled(|v| from.convert_body(to, v))),
         ..*sample
     }
 }

@@ -12,9 +12,9 @@ use crate::propagate::{self, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
 use crate::setting::{
-    ACCEL_SCALE, AID, BIAS, CALIBRATION, Choice, DECLINATION, EARTH_RATE, INIT, MAG_AXES,
-    MAG_HARD_IRON, MAG_MOUNT, METHOD, NOISE, RATE_HZ, REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH,
-    TIME, UNDO_TRUNCATION, WORLD,
+    ACCEL_SCALE, AID, BIAS, CALIBRATION, Choice, DECLINATION, EARTH_RATE, INIT,
+    LINEAR_ACCELERATION, MAG_AXES, MAG_HARD_IRON, MAG_MOUNT, METHOD, NOISE, RATE_HZ,
+    REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, UNDO_TRUNCATION, WORLD,
 };
 use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
@@ -94,6 +94,9 @@ pub struct EstimationSettings {
     /// Whether the recording is estimated as a whole, with all attitudes at its end and the sensor calibrated from it.
     /// Default: `false`, a filter.
     pub smooth: bool,
+    /// Whether attitudes carry the acceleration without gravity. It needs an accelerometer and a world that knows the
+    /// vertical. Default: `false`.
+    pub linear_acceleration: bool,
     /// Whether the accelerometer reads down at rest (kinematic acceleration), not up (specific force). The wrong one
     /// turns the attitude upside down. Default: `false`. Setting `accel_sign`.
     pub is_accel_kinematic: bool,
@@ -193,6 +196,7 @@ impl Default for EstimationSettings {
             noise: Noise::by_data(),
             aid: Aid::None,
             smooth: false,
+            linear_acceleration: false,
             is_accel_kinematic: false,
             has_forces_beside: false,
             mag_mount: None,
@@ -266,6 +270,7 @@ impl EstimationSettings {
         self.check_field()?;
         self.check_calibration()?;
         self.check_smoothing()?;
+        self.check_vertical()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
             return Err(Diagnostic::new(format!(
                 "{REGULARISE_STAMPS}: the stamps of {TIME} index are even already"
@@ -281,6 +286,18 @@ impl EstimationSettings {
             ..propagate::Settings::default()
         })
         .map_err(|e| Diagnostic::from(&e))?;
+        Ok(())
+    }
+
+    /// Gravity is taken out along the vertical.
+    fn check_vertical(&self) -> Result<(), Diagnostic> {
+        let is_level = self.world != World::Start || self.initial == Initial::Gravity;
+        if self.linear_acceleration && self.aid == Aid::None && !is_level {
+            return Err(Diagnostic::new(format!(
+                "{LINEAR_ACCELERATION}: the world of a gyro alone, which is that of its start, has no vertical"
+            ))
+            .help(format!("{AID} gravity, {INIT} gravity, or the world of a known {INIT} ({WORLD} enu)")));
+        }
         Ok(())
     }
 

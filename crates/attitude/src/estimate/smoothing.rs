@@ -11,7 +11,8 @@ use crate::frames::{Body, In, Nav};
 use crate::propagate::Executor;
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{
-    AttitudeCovariance, AttitudeSample, Join, Nanos, RateSample, SampleKind, Status,
+    AttitudeCovariance, AttitudeSample, Join, LinearAcceleration, Nanos, RateSample, SampleKind,
+    Status,
 };
 use crate::smooth::{
     Estimate, Estimated, FORCE_SCALE, FieldUnit, OtherClass, Outcome, PriorScale, PriorSigmas,
@@ -403,6 +404,8 @@ impl Smoothing {
     ) -> Result<Vec<Sizes>, SpoolError> {
         let heading = self.told.heading;
         let waiting = RefCell::new(VecDeque::new());
+        let (mut before, gives_acceleration) = (None::<Nanos>, self.aided.gives_acceleration());
+        let gravity = self.aided.filter().settings().gravity;
         let mut reading = Reading {
             waiting: Some(&waiting),
             ..self.reading(*iron)
@@ -423,15 +426,25 @@ impl Smoothing {
                     section = estimate.section;
                     status = status.with(Status::RESET);
                 }
+                let covariance =
+                    AttitudeCovariance::of_navigation_axes(&estimate.covariance, &estimate.q_nb);
+                let secs = before
+                    .replace(rate.stamp)
+                    .map_or(0.0, |t| rate.stamp.secs_since(t));
+                let force = rate.accel.filter(|_| gives_acceleration);
                 out.push(AttitudeSample {
                     stamp: rate.stamp,
                     q_nb,
                     rate: BodyRate(estimate.rate),
                     accel: rate.accel,
-                    covariance: AttitudeCovariance::of_navigation_axes(
-                        &estimate.covariance,
-                        &estimate.q_nb,
-                    ),
+                    linear_acceleration: force.map(|force| {
+                        let (force, variance) = smoothed
+                            .calibration()
+                            .calibrated_force(force.as_vector(), &estimate.rate);
+                        let variance = variance.add_scalar(LinearAcceleration::white(secs));
+                        LinearAcceleration::at(&q_nb, &covariance, &force, &variance, gravity)
+                    }),
+                    covariance,
                     status,
                     reset_count: u32::try_from(section).unwrap_or(u32::MAX),
                     log: rate.log,

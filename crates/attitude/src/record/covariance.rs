@@ -72,7 +72,7 @@ impl AttitudeCovariance {
     }
 
     /// The upper triangle of a symmetric matrix.
-    fn of(m: &Matrix3<f64>) -> AttitudeCovariance {
+    pub(super) fn of(m: &Matrix3<f64>) -> AttitudeCovariance {
         AttitudeCovariance {
             xx: m.m11,
             xy: m.m12,

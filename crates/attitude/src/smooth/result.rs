@@ -4,7 +4,7 @@ use super::border::{self, Constants, IRON_SCALE, Priors};
 use super::phase::Failure;
 use super::survey::Quantisation;
 use crate::record::Nanos;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A constant whose sigma is above this share of what it was beforehand was not observed.
 pub(crate) const OBSERVED: f64 = 0.7;
@@ -80,6 +80,26 @@ pub struct Magnetometer {
 }
 
 impl Calibration {
+    /// Calibrates a specific force (m/s^2, body axes) measured while the body turned at `rate` (rad/s); with the
+    /// variance of each component by what is not known of the calibration.
+    pub(crate) fn calibrated_force(
+        &self,
+        measured: &Vector3<f64>,
+        rate: &Vector3<f64>,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let (bias, matrix) = (&self.force_bias, &self.force);
+        let left = measured - Vector3::from(bias.value);
+        let turning = rate.cross(&left);
+        let force = left + Matrix3::from_row_slice(&matrix.value) * left;
+        let by_matrix = Matrix3::from_row_slice(&matrix.sigma.map(|sigma| sigma * sigma))
+            * left.component_mul(&left);
+        let by_bias = Vector3::from(bias.sigma.map(|sigma| sigma * sigma));
+        let [time] = self.force_time.value;
+        let [time_sigma] = self.force_time.sigma;
+        let by_time = turning.component_mul(&turning) * (time_sigma * time_sigma);
+        (force + turning * time, by_bias + by_matrix + by_time)
+    }
+
     /// `covariance`: of as many constants as there were.
     pub(super) fn of(
         constants: &Constants,

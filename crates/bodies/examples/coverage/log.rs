@@ -42,6 +42,9 @@ pub(crate) const BODIES: [&str; 22] = [
 pub(crate) struct Log {
     pub(crate) samples: Vec<RawSample>,
     pub(crate) truth: Vec<Option<[f64; 4]>>,
+    /// The acceleration without gravity that each sample's force shows, m/s^2, axes of the body at its stamp; none of a
+    /// recording.
+    pub(crate) acceleration: Vec<Vector3<f64>>,
     /// Only part of it is scored, from here on.
     pub(crate) begins_at: Option<usize>,
 }
@@ -80,21 +83,37 @@ pub(crate) fn simulated(body: &str, noise: &str, seed: u64) -> Result<Log, Failu
         seed,
     };
     let motion = Motion::Carried(Box::new(carrier.motion(seed, GRAVITY)));
-    let mut synthetic = Synthetic::new(motion, sampling).map_err(|e| e.to_string())?;
-    let mut stretch = Stretch::default();
-    synthetic
-        .next_stretch(usize::MAX, &mut stretch)
-        .map_err(|e| format!("{e:?}"))?;
-    let truth = stretch
-        .samples
-        .iter()
-        .map(|sample| sample.orientation)
-        .collect();
+    let exact = Sampling {
+        error: ImuError::default(),
+        ..sampling.clone()
+    };
+    let sampled = |sampling| -> Result<Vec<RawSample>, Failure> {
+        let mut synthetic = Synthetic::new(motion.clone(), sampling).map_err(|e| e.to_string())?;
+        let mut stretch = Stretch::default();
+        synthetic
+            .next_stretch(usize::MAX, &mut stretch)
+            .map_err(|e| format!("{e:?}"))?;
+        Ok(stretch.samples)
+    };
+    let samples = sampled(sampling)?;
+    let exact = sampled(exact)?;
+    let acceleration = exact.iter().map(|sample| {
+        let [rate, force] = [sample.gyro, sample.accel].map(|v| v.unwrap_or_default().into());
+        of_mean(&sample.orientation.unwrap_or_default(), rate, force)
+    });
     Ok(Log {
-        samples: stretch.samples,
-        truth,
+        truth: samples.iter().map(|sample| sample.orientation).collect(),
+        acceleration: acceleration.collect(),
+        samples,
         begins_at: None,
     })
+}
+
+/// The acceleration without gravity by the mean force of an interval, in axes of its end.
+fn of_mean(end: &[f64; 4], rate: Vector3<f64>, force: Vector3<f64>) -> Vector3<f64> {
+    let end = Quaternion::<(), ()>::assume_unit(*end).to_dcm();
+    let up = end.as_matrix().row(2).transpose() * GRAVITY;
+    force - rate.cross(&force) * (0.5 / HZ) - up
 }
 
 /// Parts of an interval over which rate and force are added up.
@@ -112,6 +131,7 @@ fn posed(body: &str, error: &ImuError, seed: u64) -> Result<Log, Failure> {
     let mut log = Log {
         samples: Vec::new(),
         truth: Vec::new(),
+        acceleration: Vec::new(),
         begins_at: None,
     };
     for k in 1..=(SECS * HZ) as usize {
@@ -145,6 +165,8 @@ fn posed(body: &str, error: &ImuError, seed: u64) -> Result<Log, Failure> {
             ..RawSample::default()
         });
         log.truth.push(Some(last.wxyz()));
+        log.acceleration
+            .push(of_mean(&last.wxyz(), turned / step, force));
     }
     Ok(log)
 }
@@ -155,6 +177,7 @@ pub(crate) fn read(path: &str) -> Result<Log, Failure> {
     let mut log = Log {
         samples: Vec::new(),
         truth: Vec::new(),
+        acceleration: Vec::new(),
         begins_at: Some(0),
     };
     for line in text.lines().skip(1) {

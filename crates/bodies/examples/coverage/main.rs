@@ -7,7 +7,8 @@
 //!
 //! Errors are those of earth axes from 5 s on, the heading set right there: rms of tilt and heading, the largest
 //! heading, degrees; shares of tilt (about x and about y) and of heading within three sigma; sigma of the heading at the
-//! end. `gyro` is the gyro alone after its rest. A CSV file is one of `smooth_csv` (strapd-attitude).
+//! end; rms of the acceleration without gravity along an axis of the body, m/s^2, and the share of it within three
+//! sigma. `gyro` is the gyro alone after its rest. A CSV file is one of `smooth_csv` (strapd-attitude).
 
 #![allow(clippy::print_stdout)]
 
@@ -35,6 +36,7 @@ fn plan(name: &str) -> Result<EstimationSettings, Failure> {
     let mut plan = EstimationSettings {
         kind: Some(SampleKind::Average),
         aid: Aid::Gravity,
+        linear_acceleration: true,
         ..EstimationSettings::default()
     };
     match name {
@@ -167,7 +169,7 @@ fn asked() -> Result<Asked, Failure> {
 fn main() -> Result<(), Failure> {
     let asked = asked()?;
     println!(
-        "body | noise | by | runs | tilt rms | heading rms | total rms | most | tilt in | heading in | sigma | notes"
+        "body | noise | by | runs | tilt rms | heading rms | total rms | most | tilt in | heading in | sigma | acceleration rms | in | notes"
     );
     let mut cases: Vec<(String, String, Vec<Log>)> = Vec::new();
     for file in &asked.files {

@@ -19,6 +19,8 @@ pub(crate) struct Score {
     most: f64,
     inside: [f64; 2],
     sigma: f64,
+    /// Root mean square of a component of the acceleration, m/s^2, and the share inside three sigma.
+    acceleration: [f64; 2],
 }
 
 impl Score {
@@ -32,6 +34,9 @@ impl Score {
             *sum += one;
         }
         self.sigma += other.sigma;
+        for (sum, one) in self.acceleration.iter_mut().zip(other.acceleration) {
+            *sum += one;
+        }
     }
 }
 
@@ -40,9 +45,10 @@ impl fmt::Display for Score {
         let [tilt, heading, total] = self.rms.map(|sum| sum / self.runs);
         let [t, h] = self.inside.map(|sum| sum / self.runs);
         let (most, sigma) = (self.most, self.sigma / self.runs);
+        let [a, within] = self.acceleration.map(|sum| sum / self.runs);
         write!(
             f,
-            "{tilt:.2} | {heading:.2} | {total:.2} | {most:.1} | {t:.3} | {h:.3} | {sigma:.1}"
+            "{tilt:.2} | {heading:.2} | {total:.2} | {most:.1} | {t:.3} | {h:.3} | {sigma:.1} | {a:.3} | {within:.3}"
         )
     }
 }
@@ -55,16 +61,17 @@ pub(crate) fn score(attitudes: &[AttitudeSample], log: &Log, is_absolute: bool) 
             .samples
             .binary_search_by_key(&stamp, |s| s.header.unwrap_or(s.log))
             .ok()?;
-        log.truth[at]
+        Some((log.truth[at]?, log.acceleration.get(at)))
     };
     let (mut align, mut last, mut turned): (Option<Q>, f64, f64) = (None, 0.0, 0.0);
     let (mut squares, mut inside, mut count) = ([0.0; 3], [0.0; 2], 0.0);
     let (mut most, mut sigma_at_end) = (0.0_f64, 0.0);
+    let mut accelerations = [0.0; 3];
     for attitude in attitudes {
         if log.begins_at.is_none() && attitude.stamp.secs_since(first) < FIRST {
             continue;
         }
-        let Some(reference) = truth(attitude.stamp) else {
+        let Some((reference, acceleration)) = truth(attitude.stamp) else {
             continue;
         };
         let error = Q::assume_unit(attitude.q_nb.wxyz()) * Q::assume_unit(reference).inverse();
@@ -93,6 +100,13 @@ pub(crate) fn score(attitudes: &[AttitudeSample], log: &Log, is_absolute: bool) 
         }
         inside[1] += f64::from(u8::from(turned.abs() <= 3.0 * sigma[2]));
         sigma_at_end = sigma[2].to_degrees();
+        if let Some((of, truth)) = attitude.linear_acceleration.zip(acceleration) {
+            for (error, sigma) in (of.body.as_vector() - truth).iter().zip(&of.sigma()) {
+                accelerations[0] += error * error;
+                accelerations[1] += f64::from(u8::from(error.abs() <= 3.0 * sigma));
+                accelerations[2] += 1.0;
+            }
+        }
         count += 1.0;
     }
     (count > 0.0).then(|| Score {
@@ -101,5 +115,9 @@ pub(crate) fn score(attitudes: &[AttitudeSample], log: &Log, is_absolute: bool) 
         most,
         inside: inside.map(|sum| sum / count),
         sigma: sigma_at_end,
+        acceleration: [
+            (accelerations[0] / accelerations[2]).sqrt(),
+            accelerations[1] / accelerations[2],
+        ],
     })
 }

@@ -157,8 +157,24 @@ struct Next {
 }
 
 impl Movie {
-    /// The track in an index; `None` where there is none.
+    /// The track of telemetry in an index; `None` where there is none.
     pub(crate) fn of(index: &[u8]) -> Option<Movie> {
+        Movie::track(index, |media| {
+            let kind = inside(media, &[b"minf", b"stbl", b"stsd"]).and_then(|of| of.get(12..16));
+            kind == Some(b"gpmd")
+        })
+    }
+
+    /// The first track with a picture; `None` where there is none.
+    pub(crate) fn picture(index: &[u8]) -> Option<Movie> {
+        Movie::track(index, |media| {
+            let handler = inside(media, &[b"hdlr"]).and_then(|head| head.get(8..12));
+            handler == Some(b"vide")
+        })
+    }
+
+    /// The first track whose media are those.
+    fn track(index: &[u8], is: impl Fn(&[u8]) -> bool) -> Option<Movie> {
         let created = inside(index, &[b"mvhd"]).and_then(|head| {
             let since_1904 = match head.first()? {
                 1 => u64::from_be_bytes(*head.get(4..)?.first_chunk()?),
@@ -170,7 +186,7 @@ impl Movie {
         tracks.find_map(|(_, track)| {
             let media = inside(track, &[b"mdia"])?;
             let tables = inside(media, &[b"minf", b"stbl"])?;
-            if inside(tables, &[b"stsd"])?.get(12..16)? != b"gpmd" {
+            if !is(media) {
                 return None;
             }
             let head = inside(media, &[b"mdhd"])?;
@@ -218,6 +234,11 @@ impl Movie {
     /// Number of payloads that it has given.
     pub(crate) fn told(&self) -> u64 {
         self.next.sample as u64
+    }
+
+    /// Time from which its samples count, ns since 1970; a second after that where it is not stated.
+    pub(crate) fn begins(&self) -> u64 {
+        self.created.max(1) * super::SECOND
     }
 
     fn nanos(&self, time: u64) -> u64 {

@@ -12,6 +12,8 @@ use strapd_recording::Error;
 use strapd_recording::decode::{Channel, Decoder, Options};
 use strapd_recording::format::Format;
 use strapd_recording::mcap::{Message, Reader, WalkOptions, WalkReport, walk};
+use strapd_recording::pool::Pool;
+use strapd_recording::recording::instants::Instants;
 
 fn fixture(name: &str) -> Vec<u8> {
     let fixtures = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures");
@@ -92,29 +94,68 @@ fn video(payloads: &[&[u8]], per_chunk: usize, kind: &[u8; 4]) -> Vec<u8> {
         ],
     );
     let clock = words(&[0, CREATED, CREATED, 1000, count * 1001, 0]);
-    let track = |tables: &[u8]| {
+    let track = |tables: &[u8], handler: &[u8; 4]| {
         let media = boxed(
             b"mdia",
-            &[&boxed(b"mdhd", &[&clock]), &boxed(b"minf", &[tables])],
+            &[
+                &boxed(b"mdhd", &[&clock]),
+                &boxed(b"hdlr", &[&words(&[0, 0]), handler, &[0; 12]]),
+                &boxed(b"minf", &[tables]),
+            ],
         );
         boxed(b"trak", &[&boxed(b"tkhd", &[&[0; 84]]), &media])
     };
+    // Four frames of a byte each, wherever.
     let picture = boxed(
         b"stbl",
-        &[&boxed(
-            b"stsd",
-            &[&words(&[0, 1]), &boxed(b"avc1", &[&[0; 8]])],
-        )],
+        &[
+            &boxed(b"stsd", &[&words(&[0, 1]), &boxed(b"avc1", &[&[0; 8]])]),
+            &boxed(b"stts", &[&words(&[0, 2, 3, 33, 1, 34])]),
+            &boxed(b"stsc", &[&words(&[0, 1, 1, 4, 1])]),
+            &boxed(b"stsz", &[&words(&[0, 1, 4])]),
+            &boxed(b"stco", &[&words(&[0, 1, 8])]),
+        ],
     );
     let index = boxed(
         b"moov",
         &[
             &boxed(b"mvhd", &[&clock]),
-            &track(&picture),
-            &track(&tables),
+            &track(&picture, b"vide"),
+            &track(&tables, b"meta"),
         ],
     );
     [head, boxed(b"mdat", &[&data]), index].concat()
+}
+
+#[test]
+fn frames_of_the_picture_are_instants_on_the_clock_of_the_telemetry() {
+    let payload = [0; 40];
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let frames = |bytes: &[u8]| {
+        std::fs::write(file.path(), bytes).unwrap();
+        let pool = Pool::new(1).unwrap();
+        let read = Instants::named("frames").read(file.path(), &Options::default(), &pool);
+        read.map(|(frames, _)| frames.iter().map(|t| t.0).collect::<Vec<_>>())
+    };
+    let whole = video(&[&payload], 1, b"gpmd");
+    let begins = SINCE_1970 as i64 * 1_000_000_000;
+    let expected = [0, 33, 66, 99].map(|ms| begins + ms * 1_000_000);
+    assert_eq!(frames(&whole).unwrap(), expected);
+    // A count that no file of this size can have is not believed.
+    let at = memchr::memmem::find(&whole, &words(&[0, 1, 4])).unwrap();
+    let mut many = whole.clone();
+    many[at + 8..at + 12].copy_from_slice(&u32::MAX.to_be_bytes());
+    let at = memchr::memmem::find(&many, &words(&[0, 1, 1, 4, 1])).unwrap();
+    many[at + 12..at + 16].copy_from_slice(&u32::MAX.to_be_bytes());
+    assert_eq!(frames(&many).unwrap().len(), many.len());
+    let none = [&whole[..], b""].concat();
+    let at = memchr::memmem::find(&none, b"vide").unwrap();
+    let mut sound = none;
+    sound[at..at + 4].copy_from_slice(b"soun");
+    let error = frames(&sound).unwrap_err().to_string();
+    assert!(error.contains("no track with a picture"), "{error}");
+    let error = frames(b"t_ns\n1\n").unwrap_err().to_string();
+    assert!(error.contains("it is none"), "{error}");
 }
 
 /// Sums over the samples of a vector, and of its parts without their signs.

@@ -11,8 +11,11 @@ use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::resample::{Left, Resampler};
+use strapd_attitude::setting::AT;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::Copied;
 
@@ -52,12 +55,65 @@ fn name(target: &Target) -> String {
     }
 }
 
+/// Outcome of the instants of `--at` in a stream.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Resampled {
+    /// Instants that have no attitude.
+    pub left: Left,
+    /// Number that were asked for.
+    pub asked: usize,
+    /// First and last.
+    pub span: Option<(Nanos, Nanos)>,
+}
+
+impl Resampled {
+    fn of(resampler: &Resampler) -> Resampled {
+        let instants = resampler.instants();
+        Resampled {
+            left: resampler.left(),
+            asked: instants.len(),
+            span: instants.first().copied().zip(instants.last().copied()),
+        }
+    }
+
+    /// Number of instants without an attitude.
+    pub(super) fn missing(&self) -> usize {
+        self.left.outside + self.left.in_gaps
+    }
+
+    /// Warning about them.
+    pub(super) fn warning(&self) -> Option<Diagnostic> {
+        let why = [
+            (self.left.outside, "before the first or after the last"),
+            (self.left.in_gaps, "in gaps"),
+        ];
+        let why = why.iter().filter(|(n, _)| *n > 0);
+        let why: Vec<String> = why.map(|(n, why)| format!("{n} {why}")).collect();
+        let what = format!(
+            "{AT}: {} of {} instants have no attitude: {}",
+            self.missing(),
+            self.asked,
+            why.join(", ")
+        );
+        (self.missing() > 0).then(|| Diagnostic::new(what))
+    }
+}
+
+/// Choice of the attitudes that are handed over.
+#[derive(Debug)]
+enum Selector {
+    /// Attitudes at a rate.
+    Rate(Decimator),
+    /// Attitudes at instants of their own.
+    At(Resampler),
+}
+
 /// The sinks of a run.
 #[derive(Debug)]
 pub(super) struct Outlet {
     sinks: Vec<(String, Sink)>,
     copied: Vec<BTreeMap<usize, CopiedChannel>>,
-    decimators: Vec<Option<Decimator>>,
+    selectors: Vec<Option<Selector>>,
     kept: Vec<AttitudeSample>,
     pace: Option<Pace>,
     audience: Option<Arc<dyn Audience>>,
@@ -71,6 +127,8 @@ pub(super) struct Outlet {
 pub(super) struct Delivery {
     /// `--out-rate`, Hz.
     pub out_rate: Option<f64>,
+    /// `--at`: instants of the attitudes that are handed over, in place of the samples'.
+    pub instants: Option<Arc<[Nanos]>>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
     /// Audience that is served if targets listen.
@@ -101,6 +159,7 @@ impl Outlet {
     ) -> Result<Outlet> {
         let Delivery {
             out_rate,
+            instants,
             speed,
             audience,
         } = delivery;
@@ -118,9 +177,12 @@ impl Outlet {
         Ok(Outlet {
             copied: sinks.iter().map(|_| BTreeMap::new()).collect(),
             sinks,
-            decimators: streams
+            selectors: streams
                 .iter()
-                .map(|_| out_rate.and_then(Decimator::new))
+                .map(|_| match &instants {
+                    Some(instants) => Some(Selector::At(Resampler::new(instants.to_vec()))),
+                    None => Some(Selector::Rate(out_rate.and_then(Decimator::new)?)),
+                })
                 .collect(),
             kept: Vec::new(),
             pace: Pace::new(speed),
@@ -140,15 +202,34 @@ impl Outlet {
         samples: &[AttitudeSample],
         pool: &Pool,
     ) -> Result<Flow> {
-        let Some(decimator) = self.decimators.get_mut(stream).and_then(Option::as_mut) else {
+        let Some(selector) = self.selectors.get_mut(stream).and_then(Option::as_mut) else {
             return self.hand_over(stream, samples, ATTITUDES, pool);
         };
         let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
-        decimator.select(samples, &mut kept);
+        match selector {
+            Selector::Rate(decimator) => decimator.select(samples, &mut kept),
+            Selector::At(resampler) => resampler.push(samples, &mut kept),
+        }
         let flow = self.hand_over(stream, &kept, ATTITUDES, pool);
         self.kept = kept;
         flow
+    }
+
+    /// Hands over what waits for a later attitude of a stream that has ended. What became of the instants of `--at`.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    pub(super) fn end(&mut self, stream: usize, pool: &Pool) -> Result<Option<Resampled>> {
+        let Some(Some(Selector::At(resampler))) = self.selectors.get_mut(stream) else {
+            return Ok(None);
+        };
+        let mut rest = Vec::new();
+        resampler.finish(&mut rest);
+        let left = Resampled::of(resampler);
+        // Who has had enough misses nothing by it: the stream is over.
+        let _ = self.hand_over(stream, &rest, ATTITUDES, pool)?;
+        Ok(Some(left))
     }
 
     /// Hands what a gyro put out to every sink, no faster than asked.

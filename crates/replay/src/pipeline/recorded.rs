@@ -165,6 +165,7 @@ impl RecordedTrack {
             q_nb: Convention::EnuFlu.convert(to, q_nb),
             rate: BodyRate(nothing),
             accel: None,
+            linear_acceleration: None,
             covariance: AttitudeCovariance::from_sigma(nothing),
             status: Status::OK,
             reset_count: self.resets,

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::EstimationSettings;
+use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Options;
 use strapd_recording::{Error, Selection, Source};
 
@@ -29,6 +30,8 @@ pub struct ReplayRequest {
     pub copy_input: bool,
     /// `--out-rate`, Hz.
     pub out_rate: Option<f64>,
+    /// `--at`: instants of the attitudes that are written, in place of the samples'.
+    pub instants: Option<Arc<[Nanos]>>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
     /// Audience that is served if a target listens.
@@ -55,6 +58,7 @@ impl ReplayRequest {
             options: sink::Options::default(),
             copy_input: false,
             out_rate: None,
+            instants: None,
             speed: None,
             audience: None,
             against: None,

@@ -1,7 +1,7 @@
 //! Items in order -> estimators -> outlet: the consuming half of a run, whatever the source. I/O
 //! only through the outlet.
 
-use super::delivery::Outlet;
+use super::delivery::{Outlet, Resampled};
 use super::history::History;
 use super::position::Position;
 use super::recorded::RecordedTrack;
@@ -55,6 +55,8 @@ pub(super) struct Topic {
     pub first_undecodable: Option<(Nanos, Undecodable)>,
     /// Comparison with the recorded orientation.
     pub against: Option<AgainstRecorded>,
+    /// Outcome of the instants of `--at`.
+    pub instants: Option<Resampled>,
     /// Series kept to be drawn, for a report.
     pub history: Option<History>,
     /// The recorded orientation, for who is shown it beside the estimate.
@@ -172,6 +174,7 @@ impl Topic {
             last_stamp: None,
             field,
             first_undecodable: None,
+            instants: None,
             against,
             history: None,
             recorded: None,
@@ -469,6 +472,9 @@ impl Session {
                 }
                 Ok::<(), Error>(())
             })?;
+            topic.instants = self.outlet.end(stream, pool)?;
+            let noticed = topic.instants.and_then(|of| of.warning());
+            topic.warnings.extend(noticed);
             self.outlet.known(stream, estimator);
             if let Some(against) = against {
                 against.finish(pool);

@@ -25,6 +25,7 @@ pub fn labelled(
     stream.input_kind = kind.reason.is_stated().then_some(kind.kind);
     stream.world_axes = world;
     stream.body_axes = body;
+    stream.has_linear_acceleration = plan.linear_acceleration;
     if resolved.is_remapped(plan, prepared.world) {
         stream.rotates = "body_to_world".to_owned();
         // The sensor's own frame keeps its axes; this is another one.
@@ -86,6 +87,7 @@ pub(super) fn begin(
         &provenance,
         Delivery {
             out_rate: run.out_rate,
+            instants: run.instants.clone(),
             speed: run.speed,
             audience: run.audience.clone(),
         },

@@ -123,6 +123,7 @@ fn open(simulation: &Simulation) -> Result<Outlet> {
         &provenance(simulation),
         Delivery {
             out_rate: None,
+            instants: None,
             speed: simulation.speed,
             audience: simulation.audience.clone(),
         },
@@ -185,6 +186,7 @@ fn as_attitude(truth: &Truth) -> AttitudeSample {
         q_nb: truth.spin.q_nb,
         rate: BodyRate(truth.spin.w_nb_b),
         accel: None,
+        linear_acceleration: None,
         covariance: AttitudeCovariance::default(),
         status: Status::OK,
         reset_count: 0,

@@ -3,11 +3,14 @@
 //! Apart from the summary because it is no property of an attitude: who asked for north and had no field, or for a
 //! window without a sample, gets no output, and not one that claims what it has not.
 
+use super::delivery::Resampled;
 use super::session::Topic;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, EstimationSettings};
-use strapd_attitude::record::Verdict;
-use strapd_attitude::setting::{ACCEL_TOPIC, AID, FIELD, MAG_TOPIC, START, UNTIL};
+use strapd_attitude::record::{Nanos, Verdict};
+use strapd_attitude::setting::{
+    ACCEL_TOPIC, AID, AT, FIELD, LINEAR_ACCELERATION, MAG_TOPIC, START, UNTIL,
+};
 
 /// Why a topic has not what was asked for; `None` where it has, or gave no attitude at all for other reasons.
 pub(super) fn unmet(plan: &EstimationSettings, topic: &Topic) -> Option<Diagnostic> {
@@ -32,6 +35,15 @@ pub(super) fn unmet(plan: &EstimationSettings, topic: &Topic) -> Option<Diagnost
             )),
         );
     }
+    if let Some(of) = topic.instants.filter(|of| of.missing() == of.asked) {
+        return Some(without_attitude(&of, topic));
+    }
+    if plan.linear_acceleration && counts.used() > 0 && !topic.estimator.gives_acceleration() {
+        let what = format!("{LINEAR_ACCELERATION}: there is no vertical to take gravity out along");
+        return Some(Diagnostic::new(what).help(format!(
+            "it needs an accelerometer that shows gravity: {FIELD} accel=PATH or {ACCEL_TOPIC} NAME says where it is"
+        )));
+    }
     let filter = topic.estimator.filter().filter(|_| counts.used() > 0)?;
     let asked = match plan.aid {
         Aid::None | Aid::Auto => return None,
@@ -48,6 +60,29 @@ pub(super) fn unmet(plan: &EstimationSettings, topic: &Topic) -> Option<Diagnost
     Some(Diagnostic::new(format!("{asked}: {why}")).help(format!(
         "{MAG_TOPIC} NAME or {FIELD} mag=PATH names another, {AID} gravity does without"
     )))
+}
+
+/// Refusal of instants of which none has an attitude.
+fn without_attitude(of: &Resampled, topic: &Topic) -> Diagnostic {
+    let secs = |span: Option<(Nanos, Nanos)>| {
+        let secs = |t: Nanos| t.0 as f64 * 1e-9;
+        span.map_or_else(
+            || "none".to_owned(),
+            |(a, b)| format!("{:.3} to {:.3} s", secs(a), secs(b)),
+        )
+    };
+    let output = &topic.output;
+    let attitudes = output
+        .first
+        .zip(output.last)
+        .map(|(a, b)| (a.stamp, b.stamp));
+    Diagnostic::new(format!(
+        "{AT}: none of the {} instants ({}) lies between attitudes ({})",
+        of.asked,
+        secs(of.span),
+        secs(attitudes)
+    ))
+    .help("instants are on the clock of the samples' stamps")
 }
 
 /// Whether there were samples, all outside the window that was asked for.

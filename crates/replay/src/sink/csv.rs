@@ -13,6 +13,10 @@ use strapd_attitude::record::{AttitudeSample, RawSample};
 /// turned about z, then y, then x (ZYX).
 const HEADER: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
 
+/// Rest of the first row where attitudes carry the acceleration without gravity, m/s^2: along the body's axes,
+/// one standard deviation of that, along the world's.
+const LINEAR_ACCELERATION: &[u8] = b",linear_acceleration_x,linear_acceleration_y,linear_acceleration_z,sigma_linear_acceleration_x,sigma_linear_acceleration_y,sigma_linear_acceleration_z,world_linear_acceleration_x,world_linear_acceleration_y,world_linear_acceleration_z\n";
+
 /// The first row over samples of a gyro. Rates in rad/s (delta angles in rad), specific force in
 /// m/s^2; `qw,qx,qy,qz` is the orientation that goes with the sample, where there is one.
 pub const RAW_HEADER: &[u8] =
@@ -22,9 +26,9 @@ pub const RAW_HEADER: &[u8] =
 const SYNTHETIC_HEADER: &[u8] =
     b"stamp_ns,true_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
 
-/// Rows, with what is in the last column of each.
+/// Rows, with what is in the last column of each, and whether the acceleration without gravity follows.
 #[derive(Debug)]
-struct Rows(String);
+struct Rows(String, bool);
 
 /// Begins a table of the one stream that has rows in it.
 pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn Form>> {
@@ -36,13 +40,18 @@ pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn
         None => (HEADER, String::new()),
     };
     head.extend_from_slice(header);
-    Ok(Box::new(Rows(last)))
+    let is_accelerated = stream.is_some_and(|s| s.has_linear_acceleration);
+    if is_accelerated {
+        head.pop();
+        head.extend_from_slice(LINEAR_ACCELERATION);
+    }
+    Ok(Box::new(Rows(last, is_accelerated)))
 }
 
 impl Form for Rows {
     fn encode(&self, slot: &mut Slot) {
         for sample in &slot.batch.samples {
-            push_row(&mut slot.text, sample, &self.0);
+            push_row(&mut slot.text, sample, (&self.0, self.1));
         }
         for sample in &slot.batch.raw {
             push_raw_row(&mut slot.text, sample, &self.0);
@@ -76,7 +85,7 @@ pub fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample, kind: &str) {
 }
 
 /// Appends one row with its line end. Several status names are joined by `|`; `world` is what it is relative to.
-fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, world: &str) {
+fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, (world, is_accelerated): (&str, bool)) {
     push_i64(out, sample.stamp.0);
     let q = sample.q_nb.wxyz();
     let [roll, pitch, yaw] = roll_pitch_yaw(q).map(f64::to_degrees);
@@ -93,6 +102,25 @@ fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, world: &str) {
     out.push(b',');
     push_status(out, sample, b"", b"|");
     end_row(out, world);
+    if is_accelerated {
+        out.pop();
+        push_acceleration(out, sample);
+    }
+}
+
+/// Appends the acceleration without gravity to a row, and the line end.
+fn push_acceleration(out: &mut Vec<u8>, sample: &AttitudeSample) {
+    let of = sample.linear_acceleration.map(|a| {
+        let world = a.in_world(&sample.q_nb);
+        [*a.body.as_vector(), a.sigma(), *world.as_vector()]
+    });
+    for place in 0..9 {
+        out.push(b',');
+        if let Some(vectors) = &of {
+            push_number(out, vectors[place / 3][place % 3]);
+        }
+    }
+    out.push(b'\n');
 }
 
 fn end_row(out: &mut Vec<u8>, last: &str) {
@@ -173,7 +201,7 @@ mod tests {
         s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, f64::INFINITY, 0.0));
         s.status = Status::HELD.with(Status::SATURATED);
         let mut out = HEADER.to_vec();
-        push_row(&mut out, &s, "enu");
+        push_row(&mut out, &s, ("enu", false));
         let mut reader = csv::Reader::from_reader(out.as_slice());
         assert_eq!(reader.headers().unwrap().len(), 16);
         let row = reader.records().next().unwrap().unwrap();

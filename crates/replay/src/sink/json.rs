@@ -169,7 +169,8 @@ impl AttObject {
         AttObject { head, labels }
     }
 
-    /// Appends the object, without a line end. Rate in rad/s, sigma in degrees.
+    /// Appends the object, without a line end. Rate in rad/s, sigma in degrees, accelerations (and their sigma, along the
+    /// body's axes) in m/s^2.
     pub(super) fn push(&self, out: &mut Vec<u8>, seq: u64, sample: &AttitudeSample) {
         out.extend_from_slice(&self.head);
         push_u64(out, seq);
@@ -193,6 +194,17 @@ impl AttObject {
         push_status(out, sample, b"\"", b",");
         out.extend_from_slice(b"],\"reset\":");
         push_u64(out, u64::from(sample.reset_count));
+        if let Some(of) = &sample.linear_acceleration {
+            let world = of.in_world(&sample.q_nb);
+            for (name, vector) in [
+                (&b",\"linear_acceleration\":"[..], of.body.as_vector()),
+                (b",\"sigma_linear_acceleration\":", &of.sigma()),
+                (b",\"world_linear_acceleration\":", world.as_vector()),
+            ] {
+                out.extend_from_slice(name);
+                push_array3(out, (*vector).into());
+            }
+        }
         out.push(b'}');
     }
 }

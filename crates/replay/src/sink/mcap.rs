@@ -217,6 +217,8 @@ struct Declared {
     rate: u16,
     /// Magnetic field.
     field: Option<u16>,
+    /// Acceleration without gravity.
+    acceleration: Option<u16>,
 }
 
 /// Declares a channel: its topic, its schema, the kind of its samples.
@@ -242,6 +244,7 @@ impl Declared {
                 main: declare(&stream.output_topic, schema, kind)?,
                 rate: 0,
                 field: None,
+                acceleration: None,
             });
         }
         for (stream, own) in streams.iter().zip(&mut all) {
@@ -256,6 +259,13 @@ impl Declared {
         for (stream, own) in streams.iter().zip(&mut all) {
             if let (Content::Samples(_), Some(topic)) = (&stream.content, &stream.field_topic) {
                 own.field = Some(declare(topic, FIELD_SCHEMA, None)?);
+            }
+        }
+        // In JSON it is a part of the attitude's object.
+        for (stream, own) in streams.iter().zip(&mut all) {
+            if stream.has_linear_acceleration && encoding == Encoding::Cdr {
+                let topic = format!("{}/linear_acceleration", stream.output_topic);
+                own.acceleration = Some(declare(&topic, ACCEL_SCHEMA, None)?);
             }
         }
         Ok(all)
@@ -290,6 +300,9 @@ impl Declared {
                 imu: cdr::Imu::new(main, named_frame(stream, child)),
                 transform,
                 tf: cdr::Tf::new(transform, &parent, child),
+                acceleration: self
+                    .acceleration
+                    .map(|id| (id, cdr::Stamped::new(id, named_frame(stream, child)))),
             }),
             (Content::Attitude, Encoding::Json) => Messages::Json(JsonMessages {
                 attitude: main,
@@ -312,6 +325,11 @@ const VECTOR_SCHEMA: [&str; 3] = [
     "geometry_msgs/msg/Vector3Stamped",
     "ros2msg",
     schemas::VECTOR3_STAMPED,
+];
+const ACCEL_SCHEMA: [&str; 3] = [
+    "geometry_msgs/msg/AccelWithCovarianceStamped",
+    "ros2msg",
+    schemas::ACCEL_WITH_COVARIANCE_STAMPED,
 ];
 const FIELD_SCHEMA: [&str; 3] = [
     "sensor_msgs/msg/MagneticField",

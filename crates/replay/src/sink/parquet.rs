@@ -92,7 +92,7 @@ impl Table {
         let samples = |s: &Stream| matches!(s.content, Content::Samples(_));
         let (rows, columns) = match streams.iter().any(samples) {
             true => (Rows::Samples, sample_columns(precision)),
-            false => (Rows::Attitudes, attitude_columns(precision)),
+            false => (Rows::Attitudes, attitude_columns(streams, precision)),
         };
         Table {
             rows,
@@ -136,7 +136,12 @@ impl Table {
                 8..=10 => column.extend(sigmas.iter().map(|sigma| sigma[place - 8])),
                 11 => column.extend_whole(samples.iter().map(|s| i64::from(s.status.0))),
                 12 => column.extend_whole(samples.iter().map(|s| i64::from(s.reset_count))),
-                _ => column.extend_whole(samples.iter().map(|_| stream as i64)),
+                13 => column.extend_whole(samples.iter().map(|_| stream as i64)),
+                _ => {
+                    for sample in samples {
+                        column.push(accelerations(sample).map(|of| of[place - 14]));
+                    }
+                }
             }
         }
         self.waiting += samples.len();
@@ -232,7 +237,7 @@ fn numbers(
     })
 }
 
-fn attitude_columns(precision: Precision) -> Vec<Column> {
+fn attitude_columns(streams: &[Stream], precision: Precision) -> Vec<Column> {
     let column = |(name, values)| Column::new(name, values);
     let mut columns = vec![Column::new("stamp", Values::Stamp(Vec::new()))];
     columns.extend(numbers(&["qw", "qx", "qy", "qz", "wx", "wy", "wz"], precision).map(column));
@@ -241,7 +246,34 @@ fn attitude_columns(precision: Precision) -> Vec<Column> {
     columns.push(Column::new("status", Values::Int(Vec::new())));
     columns.push(Column::new("reset", Values::Int(Vec::new())));
     columns.push(Column::new("id", Values::Name(Vec::new())));
+    if streams.iter().any(|s| s.has_linear_acceleration) {
+        let optional = |(name, values)| Column::optional(name, values);
+        let (body_and_world, sigma) = LINEAR_ACCELERATION.split_at(6);
+        columns.extend(numbers(body_and_world, precision).map(optional));
+        columns.extend(numbers(sigma, Precision::Single).map(optional));
+    }
     columns
+}
+
+/// Columns of the acceleration without gravity, m/s^2, behind the others where attitudes carry it.
+const LINEAR_ACCELERATION: [&str; 9] = [
+    "linear_acceleration_x",
+    "linear_acceleration_y",
+    "linear_acceleration_z",
+    "world_linear_acceleration_x",
+    "world_linear_acceleration_y",
+    "world_linear_acceleration_z",
+    "sigma_linear_acceleration_x",
+    "sigma_linear_acceleration_y",
+    "sigma_linear_acceleration_z",
+];
+
+/// The acceleration without gravity in the order of its columns.
+fn accelerations(sample: &AttitudeSample) -> Option<[f64; 9]> {
+    let of = sample.linear_acceleration?;
+    let world = of.in_world(&sample.q_nb);
+    let vectors = [of.body.as_vector(), world.as_vector(), &of.sigma()];
+    Some(std::array::from_fn(|i| vectors[i / 3][i % 3]))
 }
 
 fn sample_columns(precision: Precision) -> Vec<Column> {
@@ -262,7 +294,7 @@ fn sample_columns(precision: Precision) -> Vec<Column> {
 fn about(rows: Rows, streams: &[Stream], provenance: &Provenance) -> Vec<KeyValue> {
     let units = match rows {
         Rows::Attitudes => {
-            "stamp: ns; qw, qx, qy, qz: unit quaternion, scalar first; wx, wy, wz: rad/s about the axes of the body, relative to inertial space, bias taken off; sigma_x, sigma_y, sigma_z: rad about the axes of the body; reset: attitudes with another number are not to be differenced"
+            "stamp: ns; qw, qx, qy, qz: unit quaternion, scalar first; wx, wy, wz: rad/s about the axes of the body, relative to inertial space, bias taken off; sigma_x, sigma_y, sigma_z: rad about the axes of the body; reset: attitudes with another number are not to be differenced; linear_acceleration: without gravity, m/s^2 along the axes of the body, of the world with world_ before it"
         }
         Rows::Samples => {
             "stamp, true_stamp: ns; gyro_x, gyro_y, gyro_z: rad/s (delta angles: rad); accel_x, accel_y, accel_z: specific force, m/s^2; qw, qx, qy, qz: unit quaternion, scalar first, the truth; interval_ns: what a mean or a delta angle is over"

@@ -42,6 +42,8 @@ pub struct Stream {
     pub output_topic: String,
     /// Topic of the magnetic field that samples carry; `None`: no channel is declared for it.
     pub field_topic: Option<String>,
+    /// Whether its attitudes carry the acceleration without gravity.
+    pub has_linear_acceleration: bool,
     /// The frame whose attitude this is: `header.frame_id` of the Imu, child of the transform.
     pub frame_id: String,
     /// The frame it is given in: parent of the transform.
@@ -65,6 +67,7 @@ impl Stream {
             input_kind: None,
             output_topic: output_topic(input_topic, &BTreeSet::new()),
             field_topic: None,
+            has_linear_acceleration: false,
             frame_id: frame_id.to_owned(),
             world_frame: "world".to_owned(),
             rotates: "sensor_to_world".to_owned(),
@@ -82,6 +85,7 @@ impl Stream {
             input_kind: self.input_kind,
             output_topic: bounded(&self.output_topic),
             field_topic: self.field_topic.as_deref().map(bounded),
+            has_linear_acceleration: self.has_linear_acceleration,
             frame_id: bounded(&self.frame_id),
             world_frame: bounded(&self.world_frame),
             rotates: bounded(&self.rotates),

@@ -14,6 +14,7 @@ fn sample() -> AttitudeSample {
         q_nb: Quaternion::assume_unit([0.6, 0.0, 0.8, 0.0]),
         rate: BodyRate(Vector3::new(0.1, 0.2, 1.0 / 3.0)),
         accel: None,
+        linear_acceleration: None,
         covariance: AttitudeCovariance::from_sigma(Vector3::new(0.1, 0.2, 0.3)),
         status: Status::OK,
         reset_count: 3,

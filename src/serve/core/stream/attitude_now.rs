@@ -84,6 +84,7 @@ mod tests {
                 q_nb,
                 rate: BodyRate::ZERO,
                 accel: None,
+                linear_acceleration: None,
                 covariance: AttitudeCovariance::from_upper(upper),
                 status: Status::OK,
                 reset_count: 0,

@@ -212,6 +212,7 @@ mod tests {
             q_nb: Quaternion::assume_unit([half.cos(), 0.0, 0.0, half.sin()]),
             rate: BodyRate(nalgebra::Vector3::zeros()),
             accel: None,
+            linear_acceleration: None,
             covariance: AttitudeCovariance::from_sigma(nalgebra::Vector3::zeros()),
             status: Status::OK,
             reset_count: resets,

@@ -70,6 +70,7 @@ pub(super) fn read(line: &[u8]) -> Result<Reference, Fault> {
             q_nb,
             rate: BodyRate(rate.unwrap_or(nothing).into()),
             accel: None,
+            linear_acceleration: None,
             covariance: AttitudeCovariance::from_sigma(nothing.into()),
             status: Status::OK,
             reset_count: 0,

@@ -52,7 +52,7 @@ const ROW: Row = Row {
 /// Every setting of an estimation.
 // A row is read as one; broken at 100 columns it is a page.
 #[rustfmt::skip]
-pub static ROWS: [Row; 37] = [
+pub static ROWS: [Row; 38] = [
     Row {
         setting: TIME,
         meaning: "Clock on which the samples are placed; `index` needs {rate_hz}",
@@ -179,6 +179,14 @@ pub static ROWS: [Row; 37] = [
         meaning: "Smooth: the best attitude the whole recording can give, all of it at the end, with the sensor calibrated from the recording itself (needs the accelerometer; {aid} gravity+mag: heading from north)",
         default: Default::Unset("off"),
         takes: Takes::Switch(|p, on| p.smooth = on),
+        ..ROW
+    },
+    Row {
+        setting: LINEAR_ACCELERATION,
+        meaning: "Give the acceleration without gravity beside each attitude, m/s^2, with its sigma (needs an accelerometer)",
+        effect: "The accelerometer's bias is taken out as far as it is known. It is the acceleration of the place where the sensor sits.",
+        default: Default::Unset("off"),
+        takes: Takes::Switch(|p, on| p.linear_acceleration = on),
         ..ROW
     },
     Row {

@@ -270,6 +270,7 @@ impl Output {
             q_nb: Quaternion::assume_unit(q_nb),
             rate: BodyRate(self.state.rates.output.into()),
             accel: sample.accel,
+            linear_acceleration: None,
             covariance,
             status: sample.status.with(self.state.added),
             reset_count: self.state.resets,

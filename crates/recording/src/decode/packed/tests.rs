@@ -12,6 +12,7 @@ fn sample(stamp: Nanos) -> AttitudeSample {
         q_nb: Quaternion::assume_unit([0.5, -0.5, 0.5, 0.5]),
         rate: BodyRate(Vector3::new(0.1, -0.2, 0.3)),
         accel: None,
+        linear_acceleration: None,
         covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-3, 2e-3, 3e-3)),
         status: Status::OK,
         reset_count: 0,

@@ -77,7 +77,7 @@ impl Scanner {
         match &mut self.source {
             Source::New => self.begin(file)?,
             Source::Movie(movie) => {
-                let created = movie.created.max(1) * SECOND;
+                let created = movie.begins();
                 match movie.next() {
                     Some(sample) => self.sample(file, created, sample, to)?,
                     None => {

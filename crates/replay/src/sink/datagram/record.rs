@@ -84,6 +84,7 @@ pub(super) fn next<'a>(bytes: &mut &'a [u8]) -> Option<Attitude<'a>> {
             q_nb: Quaternion::assume_unit(q),
             rate: BodyRate(rate),
             accel: None,
+            linear_acceleration: None,
             covariance: AttitudeCovariance::from_sigma(Vector3::zeros()),
             status: Status::OK,
             reset_count: 0,

@@ -6,6 +6,7 @@ use super::super::batch::Batch;
 use super::super::json::{AttObject, FrameTransform};
 use super::chunk::Chunk;
 use super::{cdr, log_time};
+use strapd_attitude::record::LinearAcceleration;
 
 /// Messages of a stream.
 #[derive(Debug)]
@@ -36,15 +37,22 @@ pub(super) struct CdrMessages {
     pub(super) imu: cdr::Imu,
     pub(super) transform: u16,
     pub(super) tf: cdr::Tf,
+    /// The acceleration without gravity, where attitudes carry it.
+    pub(super) acceleration: Option<(u16, cdr::Stamped<42>)>,
 }
 
 impl CdrMessages {
     fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
         let mut previous = batch.previous;
         let (attitude, transform) = (chunk.lane(self.attitude), chunk.lane(self.transform));
+        let acceleration = self
+            .acceleration
+            .as_ref()
+            .map(|(id, message)| (chunk.lane(*id), message));
+        let beside = acceleration.map_or(0, |(_, message)| message.len());
         chunk
             .plain
-            .reserve(batch.samples.len() * (self.imu.len() + self.tf.len()));
+            .reserve(batch.samples.len() * (self.imu.len() + self.tf.len() + beside));
         for (n, sample) in (batch.first..).zip(&batch.samples) {
             let log_time = log_time(sample.log);
             let (stamp, fits) = cdr::ros_time(sample.stamp);
@@ -57,8 +65,32 @@ impl CdrMessages {
                 self.tf
                     .append(&mut chunk.plain, n as u32, log_time, stamp, sample);
             }
+            if let Some(((lane, message), of)) = acceleration.zip(sample.linear_acceleration) {
+                chunk.note(lane, log_time);
+                let numbers = accel_with_covariance(&of);
+                message.append(&mut chunk.plain, n as u32, log_time, stamp, numbers);
+            }
         }
     }
+}
+
+/// Numbers of a `geometry_msgs/msg/AccelWithCovariance`: linear, angular, 6x6 covariance row by row. What is angular is
+/// not known.
+fn accel_with_covariance(of: &LinearAcceleration) -> [f64; 42] {
+    let mut numbers = [f64::NAN; 42];
+    let [xx, xy, xz, yy, yz, zz] = of.covariance;
+    for (row, values) in [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        .iter()
+        .enumerate()
+    {
+        for (column, value) in values.iter().enumerate() {
+            numbers[6 + 6 * row + column] = *value;
+        }
+    }
+    for (place, value) in numbers.iter_mut().zip(of.body.as_vector()) {
+        *place = *value;
+    }
+    numbers
 }
 
 /// The same as JSON.

@@ -103,11 +103,28 @@ pub(super) const VECTOR3_STAMPED: &str = concat!(
     header!(), vector!(),
 );
 
+/// `geometry_msgs/msg/AccelWithCovarianceStamped`, as `ros2msg`.
+#[rustfmt::skip]
+pub(super) const ACCEL_WITH_COVARIANCE_STAMPED: &str = concat!(
+    "# Without gravity, along the axes of frame_id. The angular part is not known: NaN.\n",
+    "std_msgs/Header header\n",
+    "geometry_msgs/AccelWithCovariance accel\n",
+    header!(), vector!(),
+    "================================================================================\n",
+    "MSG: geometry_msgs/AccelWithCovariance\n",
+    "geometry_msgs/Accel accel\n",
+    "float64[36] covariance\n",
+    "================================================================================\n",
+    "MSG: geometry_msgs/Accel\n",
+    "geometry_msgs/Vector3 linear\n",
+    "geometry_msgs/Vector3 angular\n",
+);
+
 /// `foxglove.FrameTransform`, as `jsonschema`.
 pub(super) const FRAME_TRANSFORM: &str = r#"{"title":"foxglove.FrameTransform","description":"Orientation of the child frame in the parent frame","type":"object","properties":{"timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer","minimum":0,"maximum":999999999}},"required":["sec","nsec"]},"parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},"translation":{"type":"object","title":"foxglove.Vector3","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}},"required":["x","y","z"]},"rotation":{"type":"object","title":"foxglove.Quaternion","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}},"required":["x","y","z","w"]}},"required":["timestamp","parent_frame_id","child_frame_id","translation","rotation"]}"#;
 
 /// Our `ATT` object, as `jsonschema`.
-pub(super) const ATTITUDE: &str = r#"{"title":"strapd.Attitude","description":"Attitude of a body (Hamilton quaternion, rotates body components to world components), its rate in rad/s, one standard deviation about each body axis in degrees","type":"object","properties":{"class":{"const":"ATT"},"id":{"type":"string"},"seq":{"type":"integer","minimum":0},"stamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer","minimum":0,"maximum":999999999}},"required":["sec","nsec"]},"q":{"type":"object","properties":{"w":{"type":"number"},"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}},"required":["w","x","y","z"]},"rotates":{"type":"string"},"world":{"type":"string"},"body":{"type":"string"},"rate":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3},"sigma_deg":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3},"status":{"type":"array","items":{"type":"string"}},"reset":{"type":"integer","minimum":0}},"required":["class","id","seq","stamp","q","rotates","world","body","rate","sigma_deg","status","reset"]}"#;
+pub(super) const ATTITUDE: &str = r#"{"title":"strapd.Attitude","description":"Attitude of a body (Hamilton quaternion, rotates body components to world components), its rate in rad/s, one standard deviation about each body axis in degrees","type":"object","properties":{"class":{"const":"ATT"},"id":{"type":"string"},"seq":{"type":"integer","minimum":0},"stamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer","minimum":0,"maximum":999999999}},"required":["sec","nsec"]},"q":{"type":"object","properties":{"w":{"type":"number"},"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}},"required":["w","x","y","z"]},"rotates":{"type":"string"},"world":{"type":"string"},"body":{"type":"string"},"rate":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3},"sigma_deg":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3},"status":{"type":"array","items":{"type":"string"}},"reset":{"type":"integer","minimum":0},"linear_acceleration":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3},"sigma_linear_acceleration":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3},"world_linear_acceleration":{"type":"array","items":{"type":["number","null"]},"minItems":3,"maxItems":3}},"required":["class","id","seq","stamp","q","rotates","world","body","rate","sigma_deg","status","reset"]}"#;
 
 /// Reliable, volatile, keep the last 10: without it `ros2 bag play` guesses.
 ///
