@@ -13,11 +13,12 @@ use super::{Global, Outcome, outputs, print};
 use crate::config::Shard;
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
+use crate::pipeline::mounting;
 use crate::pipeline::opening;
 use crate::pipeline::replay;
-use crate::pipeline::request::ReplayRequest;
+use crate::pipeline::request::{FrameNames, ReplayRequest};
 use crate::report::summary::RunSummary;
-use crate::sink::{Compression, Encoding, Format, Options, Precision, Target};
+use crate::sink::{Compression, Encoding, Format, Options, Precision, Target, Transforms};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
 use std::io::Write;
@@ -83,6 +84,25 @@ pub struct Replay {
     #[cfg(feature = "parquet")]
     #[arg(long, help_heading = "Output")]
     pub parquet_f32: bool,
+    /// Transforms on /tf of MCAP outputs: from the world to the sensor, from the sensor to the world (where its frame
+    /// has a parent already), or none
+    #[arg(long, value_enum, default_value = "forward", help_heading = "Output")]
+    pub tf: TransformsArg,
+    /// Name of the world's frame in outputs [default: world]
+    #[arg(long, value_name = "NAME", help_heading = "Output")]
+    pub world_frame: Option<String>,
+    /// Name of the frame whose attitude is given [default: as the messages say]
+    #[arg(long, value_name = "NAME", help_heading = "Output")]
+    pub frame_id: Option<String>,
+    /// Give the attitude of this frame of the robot, on which the log's /tf_static says how the sensor is mounted:
+    /// the sensor's own frame keeps its one parent
+    #[arg(
+        long,
+        value_name = "NAME",
+        conflicts_with_all = ["frame_id", "mount"],
+        help_heading = "Output"
+    )]
+    pub base_frame: Option<String>,
     /// Write at most this many attitudes a second; the integration always uses every sample
     #[arg(
         long,
@@ -140,6 +160,27 @@ pub enum EncodingArg {
     Cdr,
     /// `foxglove.FrameTransform`.
     Json,
+}
+
+/// `--tf`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TransformsArg {
+    /// The world is the parent.
+    Forward,
+    /// The sensor is the parent.
+    Reverse,
+    /// Absence of transforms.
+    None,
+}
+
+impl From<TransformsArg> for Transforms {
+    fn from(given: TransformsArg) -> Transforms {
+        match given {
+            TransformsArg::Forward => Transforms::Forward,
+            TransformsArg::Reverse => Transforms::Reverse,
+            TransformsArg::None => Transforms::None,
+        }
+    }
 }
 
 /// `--compression`.
@@ -364,6 +405,17 @@ impl Replay {
         Ok(Some(Arc::new(track)))
     }
 
+    /// The file of a recording that is read beforehand, too.
+    fn file_read_twice<'s>(source: &'s Source, asked: &str) -> Result<&'s Path> {
+        match source {
+            Source::File(path) => Ok(path),
+            _ => {
+                let what = format!("{asked}: the recording is to be one file, which is read twice");
+                Err(Error::usage(Diagnostic::new(what).help("keep it as one")))
+            }
+        }
+    }
+
     /// The instants at which attitudes are wanted, if somebody says any.
     fn read_instants(
         &self,
@@ -375,17 +427,13 @@ impl Replay {
             return Ok(None);
         };
         let instants = Instants::named(asked);
-        let path = match (source, &instants) {
-            (Source::File(path), _) => path.clone(),
-            (_, Instants::Table(_)) => PathBuf::new(),
-            _ => {
-                let what =
-                    format!("--at {asked}: the recording is to be a file, which is read twice");
-                let help = "keep it as one, or give a table of instants";
-                return Err(Error::usage(Diagnostic::new(what).help(help)));
+        let path = match &instants {
+            Instants::Table(path) => path,
+            Instants::Frames | Instants::Topic(_) => {
+                Self::file_read_twice(source, &format!("--at {asked}"))?
             }
         };
-        let (read, note) = instants.read(&path, options, pool)?;
+        let (read, note) = instants.read(path, options, pool)?;
         if let Some(note) = note {
             tracing::warn!("{note}");
         }
@@ -400,7 +448,7 @@ impl Replay {
         &self,
         log: &str,
         outputs: &[String],
-        (selection, plan): (Selection, EstimationSettings),
+        (selection, mut plan): (Selection, EstimationSettings),
         pool: &Pool,
     ) -> Result<(ReplayRequest, Served)> {
         if self
@@ -419,6 +467,10 @@ impl Replay {
             }
             _ => Source::parse(log),
         };
+        if let Some(base) = &self.base_frame {
+            let path = Self::file_read_twice(&source, &format!("--base-frame {base}"))?;
+            plan.mount = Some(mounting::read(path, &selection, base, pool)?);
+        }
         let reference = self.read_reference(pool)?;
         let instants = self.read_instants(&source, &selection.decode, pool)?;
         let can_rewind = match &source {
@@ -446,10 +498,15 @@ impl Replay {
                 },
                 compression: self.compression.into(),
                 precision: self.precision(),
+                transforms: self.tf.into(),
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
             instants,
+            frames: FrameNames {
+                body: self.base_frame.clone().or_else(|| self.frame_id.clone()),
+                world: self.world_frame.clone(),
+            },
             speed: served.speed,
             against: match (&self.against_recorded, &reference) {
                 (None, Some(_)) => Some(String::new()),

@@ -53,6 +53,7 @@ mod stamp_units;
 mod streams;
 mod tables;
 mod trajectory;
+mod transforms;
 mod urls;
 mod youbot;
 

@@ -26,6 +26,7 @@ mod history;
 pub mod in_memory;
 pub mod inspection;
 pub(crate) mod mend;
+pub mod mounting;
 pub mod opening;
 pub mod pace;
 pub mod position;

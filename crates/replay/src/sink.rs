@@ -75,6 +75,18 @@ const BATCH_SAMPLES: usize = 2048;
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
 
+/// Transforms beside the attitudes of an MCAP.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Transforms {
+    /// Transforms from the world to the sensor: the world is the parent.
+    #[default]
+    Forward,
+    /// Transforms from the sensor to the world, where the sensor's frame has a parent already.
+    Reverse,
+    /// Absence of transforms.
+    None,
+}
+
 /// Options by which the output is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Options {
@@ -86,6 +98,8 @@ pub struct Options {
     pub compression: Compression,
     /// Numbers of a table in Parquet.
     pub precision: Precision,
+    /// Transforms of an MCAP.
+    pub transforms: Transforms,
 }
 
 /// Account of what a finished sink has written.

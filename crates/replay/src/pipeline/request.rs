@@ -13,6 +13,15 @@ use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Options;
 use strapd_recording::{Error, Selection, Source};
 
+/// Names of the frames of an attitude, instead of those of the recording and `world`.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct FrameNames {
+    /// `--frame-id`, or that of `--base-frame`: the frame whose attitude it is, of the one sensor of a run.
+    pub body: Option<String>,
+    /// `--world-frame`.
+    pub world: Option<String>,
+}
+
 /// A replay to be done.
 #[derive(Clone, Debug)]
 pub struct ReplayRequest {
@@ -32,6 +41,8 @@ pub struct ReplayRequest {
     pub out_rate: Option<f64>,
     /// `--at`: instants of the attitudes that are written, in place of the samples'.
     pub instants: Option<Arc<[Nanos]>>,
+    /// Names of frames in outputs.
+    pub frames: FrameNames,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
     /// Audience that is served if a target listens.
@@ -59,6 +70,7 @@ impl ReplayRequest {
             copy_input: false,
             out_rate: None,
             instants: None,
+            frames: FrameNames::default(),
             speed: None,
             audience: None,
             against: None,

@@ -5,13 +5,15 @@
 use super::delivery::{Delivery, Outlet};
 use super::provenance;
 use super::recorded::RecordedTrack;
-use super::request::ReplayRequest;
+use super::request::{FrameNames, ReplayRequest};
 use super::session::{Session, Topic, TopicInfo};
-use crate::error::Result;
-use crate::sink::Stream;
+use crate::error::{Error, Result};
+use crate::sink::{Stream, Transforms};
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::estimate::{Meaning, Prepared};
+use strapd_attitude::setting::TOPIC;
 
 /// The output's labels: frames and axes as they will be in the numbers.
 pub fn labelled(
@@ -58,6 +60,36 @@ pub(super) fn topic(
     Ok((topic, stream))
 }
 
+/// Gives frames the names that were asked for.
+///
+/// # Errors
+/// One name, or one world as a child, for several sensors.
+fn name_frames(run: &ReplayRequest, streams: &mut [Stream]) -> Result<()> {
+    let FrameNames { body, world } = &run.frames;
+    let is_reverse = run.options.transforms == Transforms::Reverse;
+    if streams.len() > 1 && (body.is_some() || is_reverse) {
+        let what = match body {
+            Some(name) => format!("{} sensors cannot all be the frame {name}", streams.len()),
+            None => format!(
+                "--tf reverse: the world would have {} parents, a sensor each",
+                streams.len()
+            ),
+        };
+        return Err(Error::usage(
+            Diagnostic::new(what).help(format!("{TOPIC} NAME")),
+        ));
+    }
+    for stream in streams {
+        if let Some(world) = world {
+            stream.world_frame.clone_from(world);
+        }
+        if let Some(body) = body {
+            stream.frame_id.clone_from(body);
+        }
+    }
+    Ok(())
+}
+
 /// Opens the outputs of topics and what was decided of each.
 pub(super) fn begin(
     run: &ReplayRequest,
@@ -66,7 +98,8 @@ pub(super) fn begin(
 ) -> Result<Session> {
     let topics = decided.map(|(start, prepared)| topic(run, path, start, prepared));
     let topics = topics.collect::<Result<Vec<_>>>()?;
-    let (mut topics, streams): (Vec<Topic>, Vec<Stream>) = topics.into_iter().unzip();
+    let (mut topics, mut streams): (Vec<Topic>, Vec<Stream>) = topics.into_iter().unzip();
+    name_frames(run, &mut streams)?;
     let provenance = provenance::of(run, &topics, &streams)?;
     if run.audience.as_ref().is_some_and(|a| a.wants_recorded()) {
         let is_alone = streams.len() == 1;

@@ -4,12 +4,14 @@
 //! copies and ten floats. Floats are the shortest decimals that read back to the same bits.
 //! JSON has no NaN: what is not finite is `null`.
 
+use super::Transforms;
 use super::datagram::RecordObject;
 use super::form::{Form, Opening, Slot};
 use super::plot::PlotObject;
 use super::stream::{Content, Stream};
 use super::text::{
-    push_array3, push_f64, push_i64, push_stamp, push_status, push_string, push_u64,
+    of_transform, parent_and_child, push_array3, push_f64, push_i64, push_stamp, push_status,
+    push_string, push_u64,
 };
 use crate::error::Result;
 use strapd_attitude::record::{AttitudeSample, RawSample, SampleKind};
@@ -213,24 +215,27 @@ impl AttObject {
 #[derive(Debug)]
 pub(super) struct FrameTransform {
     frames: Vec<u8>,
+    way: Transforms,
 }
 
 impl FrameTransform {
-    pub(super) fn new(parent: &str, child: &str) -> FrameTransform {
+    /// The transform between a world and the frame of a sensor.
+    pub(super) fn new(way: Transforms, world: &str, sensor: &str) -> FrameTransform {
+        let [parent, child] = parent_and_child(way, world, sensor);
         let mut frames = b",\"parent_frame_id\":".to_vec();
         push_string(&mut frames, parent);
         frames.extend_from_slice(b",\"child_frame_id\":");
         push_string(&mut frames, child);
         frames
             .extend_from_slice(b",\"translation\":{\"x\":0,\"y\":0,\"z\":0},\"rotation\":{\"x\":");
-        FrameTransform { frames }
+        FrameTransform { frames, way }
     }
 
     pub(super) fn push(&self, out: &mut Vec<u8>, sample: &AttitudeSample) {
         out.extend_from_slice(b"{\"timestamp\":");
         push_stamp(out, sample.stamp);
         out.extend_from_slice(&self.frames);
-        let [w, x, y, z] = sample.q_nb.wxyz();
+        let [w, x, y, z] = of_transform(self.way, sample);
         push_f64(out, x);
         for (name, value) in [(&b",\"y\":"[..], y), (b",\"z\":", z), (b",\"w\":", w)] {
             out.extend_from_slice(name);
@@ -298,7 +303,7 @@ mod tests {
         let mut out = Vec::new();
         let mut s = sample(Nanos(1_500_000_000));
         s.q_nb = Quaternion::assume_unit([0.1, 0.2, 0.3, 0.4]);
-        FrameTransform::new("world", "imu").push(&mut out, &s);
+        FrameTransform::new(Transforms::Forward, "world", "imu").push(&mut out, &s);
         let v: serde_json::Value = serde_json::from_slice(&out).unwrap();
         assert_eq!(
             v,

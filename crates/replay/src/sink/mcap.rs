@@ -16,6 +16,7 @@ use super::batch::Batch;
 use super::form::{Form, Opening, Slot};
 use super::json::{AttObject, FrameTransform};
 use super::stream::{ChildFrames, Content, Provenance, Stream, named_frame, parent_frame};
+use super::{Options, Transforms};
 use crate::error::{Error, Result};
 use chunk::{Chunk, Compression};
 pub use file::Attachment;
@@ -110,7 +111,7 @@ pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn
     } = opening;
     let mut file = McapFile::default();
     Ok(Box::new(Mcap {
-        layout: Layout::begin(&mut file, head, options.encoding, streams, provenance)?,
+        layout: Layout::begin(&mut file, head, *options, streams, provenance)?,
         compression: options.compression,
         file,
     }))
@@ -158,10 +159,15 @@ impl Layout {
     fn begin(
         file: &mut McapFile,
         out: &mut Vec<u8>,
-        encoding: Encoding,
+        options: Options,
         streams: &[Stream],
         provenance: &Provenance,
     ) -> Result<Layout> {
+        let Options {
+            encoding,
+            transforms,
+            ..
+        } = options;
         let metadata = push_head(file, out, encoding, provenance);
         let mut declare = |topic: &str, schema: [&str; 3], kind: Option<SampleKind>| {
             let [name, form, text] = schema;
@@ -185,11 +191,13 @@ impl Layout {
             ),
         };
         let topics = Declared::of(streams, encoding, attitude_schema, &mut declare)?;
-        let transform = if streams.iter().any(|s| s.content == Content::Attitude) {
-            declare(TF_TOPIC, transform_schema, None)?
-        } else {
-            0
+        let has_attitude = streams.iter().any(|s| s.content == Content::Attitude);
+        let transform = match has_attitude && transforms != Transforms::None {
+            true => Some((declare(TF_TOPIC, transform_schema, None)?, transforms)),
+            false => None,
         };
+        let in_cdr = transform.filter(|_| encoding == Encoding::Cdr);
+        file.transform_channel = in_cdr.map(|(id, _)| id);
 
         let mut frames = ChildFrames::default();
         let children: Vec<String> = streams.iter().map(|stream| frames.take(stream)).collect();
@@ -276,7 +284,7 @@ impl Declared {
         self,
         stream: &Stream,
         encoding: Encoding,
-        transform: u16,
+        transform: Option<(u16, Transforms)>,
         child: &str,
     ) -> Messages {
         let parent = parent_frame(stream);
@@ -298,8 +306,7 @@ impl Declared {
             (Content::Attitude, Encoding::Cdr) => Messages::Cdr(CdrMessages {
                 attitude: main,
                 imu: cdr::Imu::new(main, named_frame(stream, child)),
-                transform,
-                tf: cdr::Tf::new(transform, &parent, child),
+                transform: transform.map(|(id, way)| (id, cdr::Tf::new(id, way, &parent, child))),
                 acceleration: self
                     .acceleration
                     .map(|id| (id, cdr::Stamped::new(id, named_frame(stream, child)))),
@@ -307,8 +314,8 @@ impl Declared {
             (Content::Attitude, Encoding::Json) => Messages::Json(JsonMessages {
                 attitude: main,
                 att: AttObject::new(stream),
-                transform,
-                frame_transform: FrameTransform::new(&parent, child),
+                transform: transform
+                    .map(|(id, way)| (id, FrameTransform::new(way, &parent, child))),
             }),
         }
     }
@@ -369,6 +376,15 @@ pub(super) fn declare_copy(
     out: &mut Vec<u8>,
     channel: &InputChannel<'_>,
 ) -> Result<u16> {
+    // One topic, one channel: of two with the same name some readers take one alone.
+    let is_alike = channel.topic == TF_TOPIC
+        && channel.message_encoding == Encoding::Cdr.name()
+        && channel
+            .schema
+            .is_some_and(|(name, ..)| name == TF_SCHEMA[0]);
+    if let Some(ours) = file.transform_channel.filter(|_| is_alike) {
+        return Ok(ours);
+    }
     let schema = match channel.schema {
         Some((name, encoding, text)) => file
             .schema(out, name, encoding, text)

@@ -3,6 +3,7 @@
 //! Floats are the shortest decimals that read back to the same bits. JSON has no NaN: what is not
 //! finite is `null`.
 
+use super::Transforms;
 use serde_json::ser::{CompactFormatter, Formatter};
 use strapd_attitude::record::{AttitudeSample, Nanos};
 
@@ -68,5 +69,24 @@ pub(super) fn push_status(
         if name.is_some() {
             out.extend_from_slice(separator);
         }
+    }
+}
+/// Parent and child of the transform between a world and a sensor.
+pub(super) fn parent_and_child<'s>(
+    way: Transforms,
+    world: &'s str,
+    sensor: &'s str,
+) -> [&'s str; 2] {
+    match way {
+        Transforms::Reverse => [sensor, world],
+        Transforms::Forward | Transforms::None => [world, sensor],
+    }
+}
+
+/// Rotation of a transform, w, x, y, z: vectors of the child to the parent's.
+pub(super) fn of_transform(way: Transforms, sample: &AttitudeSample) -> [f64; 4] {
+    match way {
+        Transforms::Reverse => sample.q_nb.inverse().wxyz(),
+        Transforms::Forward | Transforms::None => sample.q_nb.wxyz(),
     }
 }

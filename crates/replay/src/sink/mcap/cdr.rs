@@ -4,6 +4,8 @@
 //! Within a stream only numbers change from message to message, always at the same places. So each
 //! stream lays its record out once and then copies and patches it: about 30 ns a message.
 
+use crate::sink::Transforms;
+use crate::sink::text::{of_transform, parent_and_child};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::mcap::MessageRecord;
 use strapd_recording::records::cdr::{Cdr, put};
@@ -203,17 +205,22 @@ impl Imu {
 
 /// `tf2_msgs/msg/TFMessage` of one stream: one transform, no translation.
 #[derive(Debug)]
-pub(crate) struct Tf(Template);
+pub(crate) struct Tf(Template, Transforms);
 
 impl Tf {
-    pub(super) fn new(channel: u16, parent: &str, child: &str) -> Tf {
+    /// The transform between a world and the frame of a sensor.
+    pub(super) fn new(channel: u16, way: Transforms, world: &str, sensor: &str) -> Tf {
+        let [parent, child] = parent_and_child(way, world, sensor);
         let mut cdr = Cdr::default();
         cdr.u32(1);
         let stamp = cdr.stamp();
         cdr.string(parent);
         cdr.string(child);
         let numbers = cdr.numbers(3 + 4);
-        Tf(Template::new(channel, (cdr.into_bytes(), stamp, numbers)))
+        Tf(
+            Template::new(channel, (cdr.into_bytes(), stamp, numbers)),
+            way,
+        )
     }
 
     /// Bytes of one message record.
@@ -231,7 +238,7 @@ impl Tf {
         sample: &AttitudeSample,
     ) {
         let numbers = self.0.append(out, sequence, log_time, stamp);
-        let [w, x, y, z] = sample.q_nb.wxyz();
+        let [w, x, y, z] = of_transform(self.1, sample);
         put(numbers, 3, [x, y, z, w]);
     }
 }
@@ -308,7 +315,7 @@ mod tests {
 
     #[test]
     fn the_tf_layout_is_the_measured_one() {
-        let tf = Tf::new(2, "world", "imu_link");
+        let tf = Tf::new(2, Transforms::Forward, "world", "imu_link");
         assert_eq!(tf.len() - MessageRecord::HEAD, 100);
         let mut s = sample(Nanos(0));
         s.q_nb = Quaternion::assume_unit([0.1, 0.2, 0.3, 0.4]);

@@ -54,6 +54,8 @@ pub(in crate::sink) struct McapFile {
     attachment_index: Vec<u8>,
     metadata: u32,
     metadata_index: Vec<u8>,
+    /// Channel of our own transforms, in CDR.
+    pub(super) transform_channel: Option<u16>,
 }
 
 impl McapFile {

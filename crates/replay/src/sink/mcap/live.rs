@@ -11,6 +11,7 @@ use super::file::McapFile;
 use super::{Encoding, IMU_SCHEMA, Provenance, Stream, TF_SCHEMA, TF_TOPIC, push_head};
 use super::{log_time, too_many_channels};
 use crate::error::{Error, Result};
+use crate::sink::Transforms;
 use crate::sink::stream::{ChildFrames, named_frame, parent_frame};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -112,7 +113,7 @@ impl LiveMcap {
             input_imu: cdr::Imu::new(input, &frame_id),
             attitude,
             imu: cdr::Imu::new(attitude, named_frame(&stream, &child)),
-            tf: cdr::Tf::new(self.transform, &parent, &child),
+            tf: cdr::Tf::new(self.transform, Transforms::Forward, &parent, &child),
             last: None,
         });
         Ok(LiveStream(self.layouts.len() - 1))

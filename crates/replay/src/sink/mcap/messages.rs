@@ -35,8 +35,8 @@ impl Messages {
 pub(super) struct CdrMessages {
     pub(super) attitude: u16,
     pub(super) imu: cdr::Imu,
-    pub(super) transform: u16,
-    pub(super) tf: cdr::Tf,
+    /// Transforms, if there are some.
+    pub(super) transform: Option<(u16, cdr::Tf)>,
     /// The acceleration without gravity, where attitudes carry it.
     pub(super) acceleration: Option<(u16, cdr::Stamped<42>)>,
 }
@@ -44,15 +44,20 @@ pub(super) struct CdrMessages {
 impl CdrMessages {
     fn fill(&self, chunk: &mut Chunk, batch: &Batch) {
         let mut previous = batch.previous;
-        let (attitude, transform) = (chunk.lane(self.attitude), chunk.lane(self.transform));
+        let attitude = chunk.lane(self.attitude);
+        let transform = self
+            .transform
+            .as_ref()
+            .map(|(id, tf)| (chunk.lane(*id), tf));
         let acceleration = self
             .acceleration
             .as_ref()
             .map(|(id, message)| (chunk.lane(*id), message));
-        let beside = acceleration.map_or(0, |(_, message)| message.len());
+        let beside = acceleration.map_or(0, |(_, message)| message.len())
+            + transform.map_or(0, |(_, tf)| tf.len());
         chunk
             .plain
-            .reserve(batch.samples.len() * (self.imu.len() + self.tf.len() + beside));
+            .reserve(batch.samples.len() * (self.imu.len() + beside));
         for (n, sample) in (batch.first..).zip(&batch.samples) {
             let log_time = log_time(sample.log);
             let (stamp, fits) = cdr::ros_time(sample.stamp);
@@ -60,10 +65,11 @@ impl CdrMessages {
             chunk.note(attitude, log_time);
             self.imu
                 .append(&mut chunk.plain, n as u32, log_time, stamp, sample);
-            if previous.replace(sample.stamp) != Some(sample.stamp) {
-                chunk.note(transform, log_time);
-                self.tf
-                    .append(&mut chunk.plain, n as u32, log_time, stamp, sample);
+            if previous.replace(sample.stamp) != Some(sample.stamp)
+                && let Some((lane, tf)) = transform
+            {
+                chunk.note(lane, log_time);
+                tf.append(&mut chunk.plain, n as u32, log_time, stamp, sample);
             }
             if let Some(((lane, message), of)) = acceleration.zip(sample.linear_acceleration) {
                 chunk.note(lane, log_time);
@@ -98,8 +104,8 @@ fn accel_with_covariance(of: &LinearAcceleration) -> [f64; 42] {
 pub(super) struct JsonMessages {
     pub(super) attitude: u16,
     pub(super) att: AttObject,
-    pub(super) transform: u16,
-    pub(super) frame_transform: FrameTransform,
+    /// Transforms, if there are some.
+    pub(super) transform: Option<(u16, FrameTransform)>,
 }
 
 impl JsonMessages {
@@ -111,10 +117,12 @@ impl JsonMessages {
             text.clear();
             self.att.push(&mut text, n, sample);
             chunk.push(self.attitude, n as u32, log_time, log_time, &text);
-            if previous.replace(sample.stamp) != Some(sample.stamp) {
+            if previous.replace(sample.stamp) != Some(sample.stamp)
+                && let Some((id, transform)) = &self.transform
+            {
                 text.clear();
-                self.frame_transform.push(&mut text, sample);
-                chunk.push(self.transform, n as u32, log_time, log_time, &text);
+                transform.push(&mut text, sample);
+                chunk.push(*id, n as u32, log_time, log_time, &text);
             }
         }
     }

@@ -4,6 +4,7 @@
 
 use super::cdr::{self, ros_time};
 use super::{IMU_SCHEMA, TF_SCHEMA, TF_TOPIC, schemas};
+use crate::sink::Transforms;
 use crate::sink::stream::{Content, Stream, named_frame, parent_frame};
 use strapd_attitude::record::{AttitudeSample, RawSample};
 use strapd_recording::mcap::MessageRecord;
@@ -61,7 +62,7 @@ impl Payloads {
         Payloads(match stream.content {
             Content::Attitude => Encoders::Attitude {
                 imu: cdr::Imu::new(0, named_frame(&stream, child)),
-                tf: cdr::Tf::new(0, &parent, child),
+                tf: cdr::Tf::new(0, Transforms::Forward, &parent, child),
             },
             Content::Samples(_) => Encoders::Samples {
                 imu: cdr::Imu::new(0, &stream.frame_id),

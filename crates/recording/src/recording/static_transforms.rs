@@ -1,0 +1,266 @@
+//! `/tf_static` of a recording -> how frames of a robot lie in each other. I/O.
+//!
+//! Apart from attitudes because these do not move: the sensor's mounting stands in them, which a user would otherwise
+//! copy from the robot's description.
+
+use super::channel_route::{Item, Route};
+use super::opened::{AHEAD, Recording};
+use crate::error::{Error, Result};
+use crate::pool::Pool;
+use crate::text::{named_few, snippet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::ControlFlow;
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::quaternion::Quaternion;
+
+/// Topic of frames that do not move.
+pub const TF_STATIC: &str = "/tf_static";
+/// Most transforms that are kept: a robot has some hundred.
+const MOST: usize = 10_000;
+/// Longest name of a frame, bytes.
+const LONGEST_NAME: usize = 4096;
+
+/// Rotation between two frames, whose types no program knows beforehand.
+type Turn = Quaternion<(), ()>;
+
+/// Frames of a robot: of each child its parent, and the rotation of the child's vectors to the parent's.
+#[derive(Clone, Debug, Default)]
+pub struct StaticTransforms(BTreeMap<String, (String, Turn)>);
+
+impl StaticTransforms {
+    /// Reads them from a recording; of a child that is said several times the last counts.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn of(log: &Recording, pool: &Pool) -> Result<StaticTransforms> {
+        let mut all = StaticTransforms::default();
+        log.walk::<Error>(
+            AHEAD,
+            pool,
+            |channel| {
+                let is_theirs = channel.topic.trim_start_matches('/') == "tf_static";
+                is_theirs.then(|| Route::only_copied(channel.clone()))
+            },
+            |items| {
+                for item in items.drain(..) {
+                    let Item::Copy(message) = item else { continue };
+                    let read = match message.channel.message_encoding.as_str() {
+                        "cdr" => Reader::cdr(&message.data),
+                        "ros1" => Some(Reader::ros1(&message.data)),
+                        _ => None,
+                    };
+                    // A message that is cut says what stands before the cut.
+                    let _: Option<()> = read.and_then(|mut reader| all.take(&mut reader));
+                }
+                Ok(ControlFlow::Continue(()))
+            },
+        )?;
+        Ok(all)
+    }
+
+    fn take(&mut self, reader: &mut Reader<'_>) -> Option<()> {
+        for _ in 0..reader.word()? {
+            let (parent, child, wxyz) = reader.transform()?;
+            let turn = Turn::try_from_wxyz(wxyz).ok();
+            if let Some(turn) = turn.filter(|_| self.0.len() < MOST) {
+                self.0.insert(child, (parent, turn));
+            }
+        }
+        Some(())
+    }
+
+    /// Rotation of a vector of `frame` to one of `base`, over whatever lies between.
+    ///
+    /// # Errors
+    /// In words: they are not connected, or one of them is not there.
+    pub fn rotation(&self, frame: &str, base: &str) -> std::result::Result<Turn, Diagnostic> {
+        let plain = |name: &str| name.trim_start_matches('/').to_owned();
+        let (frame, base) = (plain(frame), plain(base));
+        let mut beside: BTreeMap<&str, Vec<(&str, Turn)>> = BTreeMap::new();
+        for (child, (parent, turn)) in &self.0 {
+            // To the parent by the rotation, to the child by its inverse.
+            beside.entry(child).or_default().push((parent, *turn));
+            let back = turn.inverse();
+            beside.entry(parent).or_default().push((child, back));
+        }
+        let mut known: BTreeSet<&str> = BTreeSet::from([frame.as_str()]);
+        let mut waiting = VecDeque::from([(frame.as_str(), Turn::identity())]);
+        while let Some((at, turn)) = waiting.pop_front() {
+            if at == base {
+                return Ok(turn.normalised());
+            }
+            for (next, step) in beside.get(at).into_iter().flatten() {
+                if known.insert(next) {
+                    waiting.push_back((next, *step * turn));
+                }
+            }
+        }
+        let names: BTreeSet<&str> = beside.keys().copied().collect();
+        let names: Vec<&str> = names.into_iter().collect();
+        Err(Diagnostic::new(format!(
+            "{TF_STATIC} does not say how {} lies in {}; it holds {}",
+            snippet(frame.as_bytes()),
+            snippet(base.as_bytes()),
+            match names.as_slice() {
+                [] => "nothing".to_owned(),
+                _ => named_few(&names),
+            }
+        )))
+    }
+}
+
+/// Fields of a message, one after the other.
+struct Reader<'a> {
+    data: &'a [u8],
+    at: usize,
+    is_little: bool,
+    is_cdr: bool,
+}
+
+impl<'a> Reader<'a> {
+    fn cdr(data: &'a [u8]) -> Option<Reader<'a>> {
+        let (head, data) = data.split_at_checked(4)?;
+        Some(Reader {
+            data,
+            at: 0,
+            is_little: head.get(1)? & 1 == 1,
+            is_cdr: true,
+        })
+    }
+
+    fn ros1(data: &'a [u8]) -> Reader<'a> {
+        Reader {
+            data,
+            at: 0,
+            is_little: true,
+            is_cdr: false,
+        }
+    }
+
+    fn bytes<const N: usize>(&mut self) -> Option<[u8; N]> {
+        if self.is_cdr {
+            self.at = self.at.checked_next_multiple_of(N)?;
+        }
+        let bytes = *self.data.get(self.at..)?.first_chunk::<N>()?;
+        self.at += N;
+        Some(bytes)
+    }
+
+    fn word(&mut self) -> Option<u32> {
+        let bytes = self.bytes::<4>()?;
+        Some(match self.is_little {
+            true => u32::from_le_bytes(bytes),
+            false => u32::from_be_bytes(bytes),
+        })
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        let bytes = self.bytes::<8>()?;
+        Some(match self.is_little {
+            true => f64::from_le_bytes(bytes),
+            false => f64::from_be_bytes(bytes),
+        })
+    }
+
+    fn text(&mut self) -> Option<String> {
+        let length = self.word()? as usize;
+        let bytes = self.data.get(self.at..)?.get(..length)?;
+        self.at += length;
+        let text = String::from_utf8_lossy(bytes.get(..length.min(LONGEST_NAME))?);
+        let text = text.trim_end_matches('\0').trim_start_matches('/');
+        Some(text.to_owned())
+    }
+
+    /// Parent, child and rotation of one `geometry_msgs/TransformStamped`.
+    fn transform(&mut self) -> Option<(String, String, [f64; 4])> {
+        if !self.is_cdr {
+            self.word()?;
+        }
+        let _stamp = (self.word()?, self.word()?);
+        let (parent, child) = (self.text()?, self.text()?);
+        let _translation = [self.number()?, self.number()?, self.number()?];
+        let [x, y, z, w] = [
+            self.number()?,
+            self.number()?,
+            self.number()?,
+            self.number()?,
+        ];
+        Some((parent, child, [w, x, y, z]))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use strapd_attitude::quaternion::RotationVector;
+
+    fn about(axis: [f64; 3], angle: f64) -> Turn {
+        Turn::from_rotation_vector(&RotationVector(Vector3::from(axis) * angle))
+    }
+
+    /// One message of ROS 1 with these transforms.
+    fn message(transforms: &[(&str, &str, Turn)]) -> Vec<u8> {
+        let mut out = (transforms.len() as u32).to_le_bytes().to_vec();
+        for (parent, child, turn) in transforms {
+            out.extend([0; 12]);
+            for name in [parent, child] {
+                out.extend((name.len() as u32).to_le_bytes());
+                out.extend(name.as_bytes());
+            }
+            let [w, x, y, z] = turn.wxyz();
+            for number in [1.0, 2.0, 3.0, x, y, z, w] {
+                out.extend(number.to_le_bytes());
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn a_rotation_goes_up_and_down_the_tree() {
+        let (mast, imu, camera) = (
+            about([0.0, 0.0, 1.0], 0.5),
+            about([1.0, 0.0, 0.0], std::f64::consts::PI),
+            about([0.0, 1.0, 0.0], -0.3),
+        );
+        let mut all = StaticTransforms::default();
+        let said = [
+            ("base_link", "mast", mast),
+            ("/mast", "/imu_link", imu),
+            ("base_link", "camera", camera),
+        ];
+        all.take(&mut Reader::ros1(&message(&said))).unwrap();
+        let close = |found: Turn, expected: Turn| found.angle_to(&expected) < 1e-12;
+        assert!(close(
+            all.rotation("imu_link", "base_link").unwrap(),
+            mast * imu
+        ));
+        assert!(close(all.rotation("/imu_link", "mast").unwrap(), imu));
+        // Over the base and up another branch.
+        let across = camera.inverse() * mast * imu;
+        assert!(close(all.rotation("imu_link", "camera").unwrap(), across));
+        assert!(close(
+            all.rotation("imu_link", "imu_link").unwrap(),
+            Turn::identity()
+        ));
+        let why = all.rotation("imu_link", "odom").unwrap_err().to_string();
+        assert!(why.contains("odom") && why.contains("base_link"), "{why}");
+    }
+
+    #[test]
+    fn a_ring_a_cut_and_what_is_no_rotation_end() {
+        let turn = about([0.0, 0.0, 1.0], 0.1);
+        let whole = message(&[("a", "b", turn), ("b", "a", turn), ("a", "c", turn)]);
+        for length in 0..whole.len() {
+            let mut all = StaticTransforms::default();
+            let _ = all.take(&mut Reader::ros1(&whole[..length]));
+            let _ = all.rotation("c", "nowhere");
+        }
+        let mut all = StaticTransforms::default();
+        let none = Quaternion::assume_unit([0.0; 4]);
+        all.take(&mut Reader::ros1(&message(&[("a", "b", none)])))
+            .unwrap();
+        assert!(all.rotation("b", "a").is_err());
+    }
+}
