@@ -60,7 +60,8 @@ class Recorded:
         self.acc = column("accel_x", "accel_y", "accel_z")
         self.orientation = column("qw", "qx", "qy", "qz")
         self.dt = np.array([int(row["interval_ns"] or 0) for row in rows])
-        self.kind = rows[0]["sample_kind"] or "rate"
+        # Nothing where the log does not state it: who estimates finds out, as the command does.
+        self.kind = rows[0]["sample_kind"] or None
 
 
 class Said:
