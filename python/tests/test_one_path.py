@@ -79,7 +79,9 @@ def same(ours: Run, theirs: Run) -> None:
     assert att.smoothing == replayed.smoothing and said == their_words
     facts, others = att.summary, replayed.summary
     for name in set(others) - OF_THE_FILE - {"warnings", "findings", "recorded", "against_recorded"}:
-        assert facts[name] == others[name], name
+        # What the recording states is handed on by whoever calls.
+        handed_on = name == "sample_kind_by" and (facts[name], others[name]) == ("setting", "recording")
+        assert handed_on or facts[name] == others[name], name
     codes = lambda summary: [f["code"] for f in summary["findings"] if f["code"] in ("smoothing", "not-smoothed", "beyond-class")]  # noqa: E731
     assert codes(facts) == codes(others)
 
@@ -212,6 +214,7 @@ def test_recordings_of_other_makers_are_on_the_one_path() -> None:
                 read = samples(path, topic, clock)
                 # The unit of a single force, which nothing confirms, is known from its message alone.
                 if read.acc is not None and read.acc_t is read.t and len(read) > 1:
-                    same(run(strapd.estimate, read.gyr, read.acc, t=read.t, dt=read.dt, **{"kind": read.kind, **settings}), replayed)
+                    told = {"t": read.t, "dt": read.dt, "orientation": read.orientation, "kind": read.kind}
+                    same(run(strapd.estimate, read.gyr, read.acc, **told, **settings), replayed)
                     held += 1
     assert held >= 10
