@@ -132,10 +132,25 @@ impl Place {
     }
 
     fn with_free_ports(&self, text: &str) -> String {
-        let ports = PORTS.iter().zip(&self.free);
-        ports.fold(text.to_owned(), |text, (port, free)| {
-            text.replace(port, free)
-        })
+        // In one pass, and only where a port stands alone: a free one may hold another's digits, and so may a stamp.
+        let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+        let (mut out, mut rest) = (String::new(), text);
+        while let Some(first) = rest.chars().next() {
+            let stands_here = |port: &str| {
+                let behind = rest.strip_prefix(port);
+                !is_digit(out.chars().next_back())
+                    && behind.is_some_and(|behind| !is_digit(behind.chars().next()))
+            };
+            let mut ports = PORTS.iter().zip(&self.free);
+            let found = ports.find(|(port, _)| stands_here(port));
+            let (given, taken) = match found {
+                Some((port, free)) => (free.clone(), port.len()),
+                None => (first.to_string(), first.len_utf8()),
+            };
+            out += &given;
+            rest = &rest[taken..];
+        }
+        out
     }
 
     /// Whether a file, a folder or a file for each `{stem}` is there and not empty.

@@ -5,17 +5,13 @@
 use super::axes::roll_pitch_yaw;
 use super::form::{Form, Opening, Slot};
 use super::stream::{Content, Stream};
-use super::text::{push_f64, push_i64, push_status};
+use super::text::{ACCELERATIONS, accelerations, push_f64, push_i64, push_status};
 use crate::error::Result;
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are
 /// turned about z, then y, then x (ZYX).
 const HEADER: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
-
-/// Rest of the first row where attitudes carry the acceleration without gravity, m/s^2: along the body's axes,
-/// one standard deviation of that, along the world's.
-const LINEAR_ACCELERATION: &[u8] = b",linear_acceleration_x,linear_acceleration_y,linear_acceleration_z,sigma_linear_acceleration_x,sigma_linear_acceleration_y,sigma_linear_acceleration_z,world_linear_acceleration_x,world_linear_acceleration_y,world_linear_acceleration_z\n";
 
 /// The first row over samples of a gyro. Rates in rad/s (delta angles in rad), specific force in
 /// m/s^2; `qw,qx,qy,qz` is the orientation that goes with the sample, where there is one.
@@ -43,7 +39,11 @@ pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn
     let is_accelerated = stream.is_some_and(|s| s.has_linear_acceleration);
     if is_accelerated {
         head.pop();
-        head.extend_from_slice(LINEAR_ACCELERATION);
+        for name in ACCELERATIONS {
+            head.push(b',');
+            head.extend_from_slice(name.as_bytes());
+        }
+        head.push(b'\n');
     }
     Ok(Box::new(Rows(last, is_accelerated)))
 }
@@ -110,14 +110,11 @@ fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, (world, is_accelerated):
 
 /// Appends the acceleration without gravity to a row, and the line end.
 fn push_acceleration(out: &mut Vec<u8>, sample: &AttitudeSample) {
-    let of = sample.linear_acceleration.map(|a| {
-        let world = a.in_world(&sample.q_nb);
-        [*a.body.as_vector(), a.sigma(), *world.as_vector()]
-    });
-    for place in 0..9 {
+    let of = accelerations(sample);
+    for place in 0..ACCELERATIONS.len() {
         out.push(b',');
-        if let Some(vectors) = &of {
-            push_number(out, vectors[place / 3][place % 3]);
+        if let Some(numbers) = &of {
+            push_number(out, numbers[place]);
         }
     }
     out.push(b'\n');

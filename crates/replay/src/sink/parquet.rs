@@ -10,6 +10,7 @@ mod column;
 use super::batch::Batch;
 use super::form::{Form, Opening, Precision, Slot};
 use super::stream::{Content, Provenance, Stream};
+use super::text::{ACCELERATIONS, accelerations};
 use column::{Clock, Column, Values};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::data_type::ByteArray;
@@ -248,32 +249,11 @@ fn attitude_columns(streams: &[Stream], precision: Precision) -> Vec<Column> {
     columns.push(Column::new("id", Values::Name(Vec::new())));
     if streams.iter().any(|s| s.has_linear_acceleration) {
         let optional = |(name, values)| Column::optional(name, values);
-        let (body_and_world, sigma) = LINEAR_ACCELERATION.split_at(6);
+        let (body_and_world, sigma) = ACCELERATIONS.split_at(6);
         columns.extend(numbers(body_and_world, precision).map(optional));
         columns.extend(numbers(sigma, Precision::Single).map(optional));
     }
     columns
-}
-
-/// Columns of the acceleration without gravity, m/s^2, behind the others where attitudes carry it.
-const LINEAR_ACCELERATION: [&str; 9] = [
-    "linear_acceleration_x",
-    "linear_acceleration_y",
-    "linear_acceleration_z",
-    "world_linear_acceleration_x",
-    "world_linear_acceleration_y",
-    "world_linear_acceleration_z",
-    "sigma_linear_acceleration_x",
-    "sigma_linear_acceleration_y",
-    "sigma_linear_acceleration_z",
-];
-
-/// The acceleration without gravity in the order of its columns.
-fn accelerations(sample: &AttitudeSample) -> Option<[f64; 9]> {
-    let of = sample.linear_acceleration?;
-    let world = of.in_world(&sample.q_nb);
-    let vectors = [of.body.as_vector(), world.as_vector(), &of.sigma()];
-    Some(std::array::from_fn(|i| vectors[i / 3][i % 3]))
 }
 
 fn sample_columns(precision: Precision) -> Vec<Column> {

@@ -71,6 +71,28 @@ pub(super) fn push_status(
         }
     }
 }
+/// Columns of the acceleration without gravity, m/s^2, behind the others of a table whose attitudes carry it: along the
+/// body's axes, along the world's, one standard deviation along the body's.
+pub(super) const ACCELERATIONS: [&str; 9] = [
+    "linear_acceleration_x",
+    "linear_acceleration_y",
+    "linear_acceleration_z",
+    "world_linear_acceleration_x",
+    "world_linear_acceleration_y",
+    "world_linear_acceleration_z",
+    "sigma_linear_acceleration_x",
+    "sigma_linear_acceleration_y",
+    "sigma_linear_acceleration_z",
+];
+
+/// Numbers of the [columns](ACCELERATIONS); `None` of a sample without a specific force.
+pub(super) fn accelerations(sample: &AttitudeSample) -> Option<[f64; 9]> {
+    let of = sample.linear_acceleration?;
+    let world = of.in_world(&sample.q_nb);
+    let vectors = [of.body.as_vector(), world.as_vector(), &of.sigma()];
+    Some(std::array::from_fn(|i| vectors[i / 3][i % 3]))
+}
+
 /// Parent and child of the transform between a world and a sensor.
 pub(super) fn parent_and_child<'s>(
     way: Transforms,
