@@ -48,5 +48,6 @@ mod stamp_units;
 mod state;
 mod storms;
 mod strangers;
+mod tls;
 mod transports;
 mod watch;

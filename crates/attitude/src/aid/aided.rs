@@ -173,10 +173,11 @@ impl AidedPropagator {
         self
     }
 
-    /// The same where attitudes carry the acceleration without gravity, of samples that a specific force goes with.
+    /// The same where attitudes carry the acceleration without gravity, of samples that a specific force goes with, or
+    /// do not.
     #[must_use]
-    pub fn with_linear_acceleration(mut self) -> AidedPropagator {
-        self.gives_acceleration = true;
+    pub fn with_linear_acceleration(mut self, is_given: bool) -> AidedPropagator {
+        self.gives_acceleration = is_given;
         self
     }
 

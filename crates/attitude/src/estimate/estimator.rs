@@ -13,7 +13,7 @@ use super::meaning::Meaning;
 use super::memory::Memory;
 use super::noise_presets::UNCALIBRATED;
 use super::open_kind::{Event, OpenKind};
-use super::output_frame::{OutputFrame, turned_north};
+use super::output_frame::OutputFrame;
 use super::plan::{EstimationSettings, Initial, Noise};
 use super::preparation::{Prepared, is_causal};
 use super::retaking::{Besides, Retaking, Stages};
@@ -29,7 +29,6 @@ use crate::diagnostic::Diagnostic;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use crate::smooth::PriorSigmas;
-use crate::worlds::World;
 
 /// Samples at once that memory is kept for.
 const FEW: usize = 8;
@@ -190,11 +189,9 @@ impl Estimator {
                         let noise = Noise::preset(UNCALIBRATED);
                         (looseness(&wide, &noise), wide)
                     });
-                    let aided = aided.or_of(wide.map(|(_, wide)| OtherClass::of(&wide)));
-                    let aided = match plan.linear_acceleration {
-                        true => aided.with_linear_acceleration(),
-                        false => aided,
-                    };
+                    let aided = aided
+                        .or_of(wide.map(|(_, wide)| OtherClass::of(&wide)))
+                        .with_linear_acceleration(plan.linear_acceleration);
                     if plan.smooth {
                         let heading = match aiding.start {
                             aid::Start::Level | aid::Start::LevelBy(_) => None,
@@ -223,7 +220,6 @@ impl Estimator {
             }
         }
         .map_err(|e| Diagnostic::from(&e))?;
-        let is_level = prepared.world != World::Start || plan.initial == Initial::Gravity;
         Ok(Estimator {
             settings: settings_fingerprint(settings, plan, prepared, &noise),
             conditioner: {
@@ -234,14 +230,7 @@ impl Estimator {
             retaking: Retaking::default(),
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
-            asked: OutputFrame {
-                delay: plan.sensor_delay_secs,
-                world: prepared.world,
-                north: (plan.declination != 0.0 && prepared.aiding.is_some())
-                    .then(|| turned_north(plan.declination)),
-                gravity: (plan.linear_acceleration && prepared.aiding.is_none() && is_level)
-                    .then(|| aid::Settings::default().gravity),
-            },
+            asked: OutputFrame::of(plan, prepared),
             beside: Vec::new(),
             besides: prepared.aiding.map(|aiding| AuxiliaryInputs {
                 resolved: resolved.clone(),

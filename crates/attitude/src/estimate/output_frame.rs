@@ -1,5 +1,8 @@
 //! Attitudes as computed <-> attitudes as asked for: world, north, instant. Pure.
 
+use super::plan::{EstimationSettings, Initial};
+use super::preparation::Prepared;
+use crate::aid;
 use crate::frames::{In, Nav};
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeSample, LinearAcceleration};
@@ -19,6 +22,19 @@ pub(super) struct OutputFrame {
 }
 
 impl OutputFrame {
+    /// The frame that was asked for, by what was prepared.
+    pub(super) fn of(plan: &EstimationSettings, prepared: &Prepared) -> OutputFrame {
+        let is_aided = prepared.aiding.is_some();
+        let is_level = prepared.world != World::Start || plan.initial == Initial::Gravity;
+        OutputFrame {
+            delay: plan.sensor_delay_secs,
+            world: prepared.world,
+            north: (plan.declination != 0.0 && is_aided).then(|| turned_north(plan.declination)),
+            gravity: (plan.linear_acceleration && !is_aided && is_level)
+                .then(|| aid::Settings::default().gravity),
+        }
+    }
+
     /// Converts from the convention everything is computed in (ENU or start, FLU) to the one asked for: world and
     /// body change together.
     pub(super) fn apply(&self, out: &mut [AttitudeSample]) {
