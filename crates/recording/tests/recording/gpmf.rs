@@ -156,6 +156,18 @@ fn frames_of_the_picture_are_instants_on_the_clock_of_the_telemetry() {
     assert!(error.contains("no track with a picture"), "{error}");
     let error = frames(b"t_ns\n1\n").unwrap_err().to_string();
     assert!(error.contains("it is none"), "{error}");
+    // Whatever stands in its boxes, it ends with no more frames than bytes.
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    for _ in 0..4000 {
+        let mut changed = whole.clone();
+        for _ in 0..rng.random_range(1..4) {
+            let at = rng.random_range(0..changed.len());
+            changed[at] = rng.random();
+        }
+        if let Ok(found) = frames(&changed) {
+            assert!(found.len() <= changed.len());
+        }
+    }
 }
 
 /// Sums over the samples of a vector, and of its parts without their signs.
