@@ -11,6 +11,7 @@ use crate::quaternion::{BodyRate, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, LinearAcceleration, Nanos, Status};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Status of an attitude that does not go on from the one before it: there is no motion to follow.
 const CUTS: Status =
@@ -64,7 +65,7 @@ pub struct Left {
 #[derive(Clone, Debug)]
 pub struct Resampler {
     /// Instants in order of time.
-    instants: Vec<Nanos>,
+    instants: Arc<[Nanos]>,
     /// Number of them that are done.
     done: usize,
     /// The newest attitudes, oldest first.
@@ -73,10 +74,15 @@ pub struct Resampler {
 }
 
 impl Resampler {
-    /// Makes one for these instants, in any order.
+    /// Makes one for these instants, in any order; those in order of time are shared, and others copied.
     #[must_use]
-    pub fn new(mut instants: Vec<Nanos>) -> Resampler {
-        instants.sort_unstable();
+    pub fn new(instants: impl Into<Arc<[Nanos]>>) -> Resampler {
+        let mut instants = instants.into();
+        if !instants.is_sorted() {
+            let mut ordered = instants.to_vec();
+            ordered.sort_unstable();
+            instants = ordered.into();
+        }
         Resampler {
             instants,
             done: 0,
@@ -189,14 +195,9 @@ impl Resampler {
         let earlier = right.checked_sub(2).map(|at| &self.window[at]);
         let earlier = earlier.filter(|_| !before.status.has(CUTS));
         let later = self.window.get(right + 1).filter(|s| !s.status.has(CUTS));
-        // Turn over this step by the rate at either end.
-        let begins = earlier.map_or(turn, |earlier| by_parabola((earlier, before), turn, span));
-        let ends = later.map_or(turn, |later| {
-            let own = after.stamp.since(before.stamp) as f64;
-            let next = later.stamp.since(after.stamp) as f64;
-            let share = next / (own + next);
-            turn * share + turned(after, later) * (span / next) * (1.0 - share)
-        });
+        // Turn over this step by the rate at either end; that of the step itself where nothing lies beside it.
+        let begins = earlier.map_or(turn, |earlier| rate_at([earlier, before, after]) * span);
+        let ends = later.map_or(turn, |later| rate_at([before, after, later]) * span);
         let (two, three) = (part * part, part * part * part);
         // Beside their mean the rates of the ends differ by little: what the group's curvature adds is of third order.
         let bend = (begins - turn) * (part - 2.0 * two + three) + (ends - turn) * (three - two);
@@ -238,16 +239,12 @@ fn turned(before: &AttitudeSample, after: &AttitudeSample) -> Vector3<f64> {
     (before.q_nb.inverse() * after.q_nb).rotation_vector().0
 }
 
-/// Turn over a step of `span` ns by the rate at its beginning, of the parabola through that and its neighbours: `turn` is
-/// what was turned in it.
-fn by_parabola(
-    (earlier, before): (&AttitudeSample, &AttitudeSample),
-    turn: Vector3<f64>,
-    span: f64,
-) -> Vector3<f64> {
-    let last = before.stamp.since(earlier.stamp) as f64;
-    let share = span / (last + span);
-    turned(earlier, before) * (span / last) * share + turn * (1.0 - share)
+/// Rate at the middle one of three attitudes, rad/ns: that of the parabola through them.
+fn rate_at([earlier, at, later]: [&AttitudeSample; 3]) -> Vector3<f64> {
+    let nanos = |from: &AttitudeSample, to: &AttitudeSample| to.stamp.since(from.stamp) as f64;
+    let (before, after) = (nanos(earlier, at), nanos(at, later));
+    let share = after / (before + after);
+    turned(earlier, at) * (share / before) + turned(at, later) * ((1.0 - share) / after)
 }
 
 #[cfg(test)]
@@ -282,7 +279,7 @@ mod tests {
     }
 
     fn at(samples: &[AttitudeSample], instants: &[i64], cut: usize) -> (Vec<AttitudeSample>, Left) {
-        let mut resampler = Resampler::new(instants.iter().copied().map(Nanos).collect());
+        let mut resampler = Resampler::new(instants.iter().copied().map(Nanos).collect::<Vec<_>>());
         let mut out = Vec::new();
         for part in samples.chunks(cut) {
             resampler.push(part, &mut out);

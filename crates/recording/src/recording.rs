@@ -20,7 +20,7 @@
 //! | [`selection`], [`topics`], [`log_topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
 //! | [`instants`] | when attitudes are wanted beside the samples: frames, stamps of a topic, rows |
-//! | [`static_transforms`] | how frames of a robot lie in each other |
+//! | [`static_transforms`], `message_reader` | how frames of a robot lie in each other |
 //! | `samples`, [`topic_plan`], [`topic_reading`] | how a topic is read, and which messages are its own; all samples that are selected, one topic |
 //! | [`own_output`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
@@ -41,6 +41,7 @@ mod line_input;
 mod line_reader;
 pub mod log_channel;
 pub mod log_topics;
+mod message_reader;
 pub mod opened;
 pub mod own_output;
 mod parts;

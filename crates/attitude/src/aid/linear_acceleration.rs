@@ -6,6 +6,7 @@
 use super::covariance::{FORCE_BIAS, LEAD, SCALE, TILT};
 use super::filter::{COLOURED, Filter};
 use super::other_class::NUMBERS;
+use super::settings::Settings;
 use crate::frames::In;
 use crate::record::LinearAcceleration;
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -55,12 +56,14 @@ impl Filter {
                 covariance.between(CAUSES[i], SCALE + j)
             });
             let rows = by * with;
-            p += rows
-                * SMatrix::<f64, NUMBERS, NUMBERS>::from_diagonal(&doubt.weights.into())
-                * rows.transpose();
+            p += doubt.by(&std::array::from_fn(|a| {
+                std::array::from_fn(|i| rows[(a, i)])
+            }));
         }
-        // What is no state: white noise, scale, gravity's own size, axes of the case.
-        let class = (settings.force_bias_prior / 0.02).min(1.0);
+        // What is no state: white noise, less of a better class; scale, of which the gyro's tells the class; gravity's
+        // own size.
+        let usual = Settings::default().force_bias_prior;
+        let class = (settings.force_bias_prior / usual).min(1.0);
         let white = class * class * LinearAcceleration::white(self.state.nominal);
         let direction = force * settings.scale_prior;
         p += Matrix3::from_diagonal_element(white)

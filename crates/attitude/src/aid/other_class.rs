@@ -50,8 +50,13 @@ impl OtherClass {
 impl ClassDoubt {
     /// Covariance that the attitude has more, rad^2, earth axes.
     pub(super) fn of(&self, covariance: &Covariance) -> Matrix3<f64> {
-        let rows: [[f64; NUMBERS]; 3] =
-            std::array::from_fn(|a| std::array::from_fn(|i| covariance.between(a, SCALE + i)));
+        self.by(&std::array::from_fn(|a| {
+            std::array::from_fn(|i| covariance.between(a, SCALE + i))
+        }))
+    }
+
+    /// Covariance that three quantities have more, whose covariances with the numbers are these rows.
+    pub(super) fn by(&self, rows: &[[f64; NUMBERS]; 3]) -> Matrix3<f64> {
         let between = |a: usize, b: usize| -> f64 {
             let products = rows[a].iter().zip(&rows[b]).zip(&self.weights);
             products.map(|((a, b), weight)| a * b * weight).sum()

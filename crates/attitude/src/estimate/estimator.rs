@@ -46,7 +46,6 @@ pub struct Estimator {
     beside: Besides,
     /// Auxiliary inputs; `None` where nothing of them is used.
     besides: Option<AuxiliaryInputs>,
-    gives_acceleration: bool,
     /// Watch over the gyro, where somebody wants it; it changes no attitude and is not remembered.
     watch: Option<GyroWatch>,
     /// The same over the magnetometer.
@@ -239,7 +238,6 @@ impl Estimator {
                 has_field: aiding.settings.has_field,
                 force_scale: None,
             }),
-            gives_acceleration: plan.linear_acceleration,
             watch: None,
             magnetometer: None,
             begins_anew: false,
@@ -668,11 +666,7 @@ impl Estimator {
     /// something tells the vertical.
     #[must_use]
     pub fn gives_acceleration(&self) -> bool {
-        let is_corrected = self
-            .integrator
-            .filter()
-            .is_some_and(aid::Filter::is_started);
-        self.gives_acceleration && (is_corrected || self.asked.gravity.is_some())
+        self.integrator.gives_acceleration() || self.asked.gravity.is_some()
     }
 
     /// The method, with its window and order.

@@ -168,6 +168,13 @@ impl Integrator {
         }
     }
 
+    /// Whether attitudes carry the acceleration without gravity: it was asked for, and they are corrected.
+    pub(super) fn gives_acceleration(&self) -> bool {
+        let is_given =
+            |aided: &AidedPropagator| aided.gives_acceleration() && aided.filter().is_started();
+        self.aided().is_some_and(is_given)
+    }
+
     /// Returns whether there is a vertical to turn the world about.
     pub(super) fn turn_heading(&mut self, heading: f64) -> bool {
         let Integrator::Aided(aided) = self else {

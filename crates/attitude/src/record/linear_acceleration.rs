@@ -72,13 +72,6 @@ impl LinearAcceleration {
         AttitudeCovariance::from_upper(self.covariance).sigma()
     }
 
-    /// One standard deviation along each axis of the world, m/s^2.
-    #[must_use]
-    pub fn sigma_in_world(&self, q_nb: &Quaternion<Nav, Body>) -> Vector3<f64> {
-        let world = AttitudeCovariance::from_upper(self.covariance).in_navigation_axes(q_nb);
-        world.diagonal().map(|variance| variance.max(0.0).sqrt())
-    }
-
     /// The same along other body axes: `change` gives the new components of a body vector.
     #[must_use]
     pub(crate) fn relabelled(

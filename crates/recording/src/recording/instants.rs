@@ -4,6 +4,7 @@
 
 use super::channel_route::{Item, Route};
 use super::input::Input;
+use super::message_reader::MessageReader;
 use super::opened::{AHEAD, Recording};
 use super::warn::Warn;
 use crate::columns::{Delimiter, Meant, Name, Unit};
@@ -50,7 +51,7 @@ impl Instants {
         }
     }
 
-    /// Reads them, in the order in which they come, on the clock of the recording at `source`. With a note where they are
+    /// Reads them, in order of time, on the clock of the recording at `source`. With a note where they are
     /// of another clock than headers are.
     ///
     /// # Errors
@@ -61,11 +62,13 @@ impl Instants {
         options: &Options,
         pool: &Pool,
     ) -> Result<(Vec<Nanos>, Option<String>)> {
-        match self {
-            Instants::Frames => Ok((frames(source)?, None)),
-            Instants::Table(path) => Ok((of_table(path)?, None)),
-            Instants::Topic(topic) => of_topic(source, topic, options, pool),
-        }
+        let (mut instants, note) = match self {
+            Instants::Frames => (frames(source)?, None),
+            Instants::Table(path) => (of_table(path)?, None),
+            Instants::Topic(topic) => of_topic(source, topic, options, pool)?,
+        };
+        instants.sort_unstable();
+        Ok((instants, note))
     }
 }
 
@@ -148,6 +151,10 @@ fn of_topic(
             ),
         ));
     }
+    if instants.is_empty() {
+        let what = format!("{topic} holds no messages that have an instant");
+        return Err(refused(source, what, "a table with a column of stamps"));
+    }
     few_enough(source, instants.len())?;
     let note = (by_log > 0).then(|| {
         format!("{by_log} messages of {topic} have no header with a stamp: they count when they were recorded")
@@ -176,26 +183,8 @@ fn header_stamp(channel: &Channel, data: &[u8]) -> Option<Nanos> {
     if !["std_msgs/Header", "std_msgs/msg/Header", "Header"].contains(&kind) {
         return None;
     }
-    let (is_little, body) = match channel.message_encoding.as_str() {
-        "cdr" => (data.get(1)? & 1 == 1, data.get(4..)?),
-        // A sequence number stands before the stamp.
-        "ros1" => (true, data.get(4..)?),
-        _ => return None,
-    };
-    let word = |at: usize| -> Option<u32> {
-        let bytes = *body.get(at..)?.first_chunk::<4>()?;
-        Some(match is_little {
-            true => u32::from_le_bytes(bytes),
-            false => u32::from_be_bytes(bytes),
-        })
-    };
-    let (sec, nanosec) = (word(0)?, word(4)?);
-    let sec = match channel.message_encoding.as_str() {
-        // ROS 2 has a signed one.
-        "cdr" => i64::from(sec as i32),
-        _ => i64::from(sec),
-    };
-    Some(Nanos::from_sec_nanosec(sec, nanosec)).filter(|stamp| stamp.0 != 0)
+    let mut reader = MessageReader::of(&channel.message_encoding, data)?;
+    reader.stamp().filter(|stamp| stamp.0 != 0)
 }
 
 /// Stamps of the rows of a table: of the column that is named as one, else of the first.
@@ -216,6 +205,10 @@ fn of_table(path: &Path) -> Result<Vec<Nanos>> {
         })?;
         if read == 0 {
             break;
+        }
+        if read as u64 == LONGEST_ROW && !line.ends_with(b"\n") {
+            let what = format!("line {number} is longer than {LONGEST_ROW} bytes");
+            return Err(refused(path, what, "a table with one instant a line"));
         }
         let row = line.trim_ascii();
         if row.is_empty() {
@@ -368,6 +361,11 @@ mod tests {
             ("t_ns\n1\nx\n", "line 3"),
             ("a,t_ns\n1\n", "line 2"),
             ("t\n3\n", "unit"),
+            // The rest of a long row is no row of its own.
+            (
+                &format!("t_ns\n1,{}\n", "7".repeat(70_000)),
+                "line 2 is longer",
+            ),
         ] {
             let error = read(text).unwrap_err().to_string();
             assert!(error.contains(says), "{text:?}: {error}");

@@ -4,6 +4,7 @@
 //! copy from the robot's description.
 
 use super::channel_route::{Item, Route};
+use super::message_reader::MessageReader;
 use super::opened::{AHEAD, Recording};
 use crate::error::{Error, Result};
 use crate::pool::Pool;
@@ -17,8 +18,11 @@ use strapd_attitude::quaternion::Quaternion;
 pub const TF_STATIC: &str = "/tf_static";
 /// Most transforms that are kept: a robot has some hundred.
 const MOST: usize = 10_000;
-/// Longest name of a frame, bytes.
-const LONGEST_NAME: usize = 4096;
+
+/// Returns a name without the slash that ROS 1 had before it.
+fn plain(name: &str) -> &str {
+    name.trim_start_matches('/')
+}
 
 /// Rotation between two frames, whose types no program knows beforehand.
 type Turn = Quaternion<(), ()>;
@@ -38,17 +42,14 @@ impl StaticTransforms {
             AHEAD,
             pool,
             |channel| {
-                let is_theirs = channel.topic.trim_start_matches('/') == "tf_static";
+                let is_theirs = plain(&channel.topic) == plain(TF_STATIC);
                 is_theirs.then(|| Route::only_copied(channel.clone()))
             },
             |items| {
                 for item in items.drain(..) {
                     let Item::Copy(message) = item else { continue };
-                    let read = match message.channel.message_encoding.as_str() {
-                        "cdr" => Reader::cdr(&message.data),
-                        "ros1" => Some(Reader::ros1(&message.data)),
-                        _ => None,
-                    };
+                    let encoding = &message.channel.message_encoding;
+                    let read = MessageReader::of(encoding, &message.data);
                     // A message that is cut says what stands before the cut.
                     let _: Option<()> = read.and_then(|mut reader| all.take(&mut reader));
                 }
@@ -58,9 +59,9 @@ impl StaticTransforms {
         Ok(all)
     }
 
-    fn take(&mut self, reader: &mut Reader<'_>) -> Option<()> {
+    fn take(&mut self, reader: &mut MessageReader<'_>) -> Option<()> {
         for _ in 0..reader.word()? {
-            let (parent, child, wxyz) = reader.transform()?;
+            let (parent, child, wxyz) = transform(reader)?;
             let turn = Turn::try_from_wxyz(wxyz).ok();
             if let Some(turn) = turn.filter(|_| self.0.len() < MOST) {
                 self.0.insert(child, (parent, turn));
@@ -74,7 +75,6 @@ impl StaticTransforms {
     /// # Errors
     /// In words: they are not connected, or one of them is not there.
     pub fn rotation(&self, frame: &str, base: &str) -> std::result::Result<Turn, Diagnostic> {
-        let plain = |name: &str| name.trim_start_matches('/').to_owned();
         let (frame, base) = (plain(frame), plain(base));
         let mut beside: BTreeMap<&str, Vec<(&str, Turn)>> = BTreeMap::new();
         for (child, (parent, turn)) in &self.0 {
@@ -83,8 +83,8 @@ impl StaticTransforms {
             let back = turn.inverse();
             beside.entry(parent).or_default().push((child, back));
         }
-        let mut known: BTreeSet<&str> = BTreeSet::from([frame.as_str()]);
-        let mut waiting = VecDeque::from([(frame.as_str(), Turn::identity())]);
+        let mut known: BTreeSet<&str> = BTreeSet::from([frame]);
+        let mut waiting = VecDeque::from([(frame, Turn::identity())]);
         while let Some((at, turn)) = waiting.pop_front() {
             if at == base {
                 return Ok(turn.normalised());
@@ -109,84 +109,18 @@ impl StaticTransforms {
     }
 }
 
-/// Fields of a message, one after the other.
-struct Reader<'a> {
-    data: &'a [u8],
-    at: usize,
-    is_little: bool,
-    is_cdr: bool,
-}
-
-impl<'a> Reader<'a> {
-    fn cdr(data: &'a [u8]) -> Option<Reader<'a>> {
-        let (head, data) = data.split_at_checked(4)?;
-        Some(Reader {
-            data,
-            at: 0,
-            is_little: head.get(1)? & 1 == 1,
-            is_cdr: true,
-        })
-    }
-
-    fn ros1(data: &'a [u8]) -> Reader<'a> {
-        Reader {
-            data,
-            at: 0,
-            is_little: true,
-            is_cdr: false,
-        }
-    }
-
-    fn bytes<const N: usize>(&mut self) -> Option<[u8; N]> {
-        if self.is_cdr {
-            self.at = self.at.checked_next_multiple_of(N)?;
-        }
-        let bytes = *self.data.get(self.at..)?.first_chunk::<N>()?;
-        self.at += N;
-        Some(bytes)
-    }
-
-    fn word(&mut self) -> Option<u32> {
-        let bytes = self.bytes::<4>()?;
-        Some(match self.is_little {
-            true => u32::from_le_bytes(bytes),
-            false => u32::from_be_bytes(bytes),
-        })
-    }
-
-    fn number(&mut self) -> Option<f64> {
-        let bytes = self.bytes::<8>()?;
-        Some(match self.is_little {
-            true => f64::from_le_bytes(bytes),
-            false => f64::from_be_bytes(bytes),
-        })
-    }
-
-    fn text(&mut self) -> Option<String> {
-        let length = self.word()? as usize;
-        let bytes = self.data.get(self.at..)?.get(..length)?;
-        self.at += length;
-        let text = String::from_utf8_lossy(bytes.get(..length.min(LONGEST_NAME))?);
-        let text = text.trim_end_matches('\0').trim_start_matches('/');
-        Some(text.to_owned())
-    }
-
-    /// Parent, child and rotation of one `geometry_msgs/TransformStamped`.
-    fn transform(&mut self) -> Option<(String, String, [f64; 4])> {
-        if !self.is_cdr {
-            self.word()?;
-        }
-        let _stamp = (self.word()?, self.word()?);
-        let (parent, child) = (self.text()?, self.text()?);
-        let _translation = [self.number()?, self.number()?, self.number()?];
-        let [x, y, z, w] = [
-            self.number()?,
-            self.number()?,
-            self.number()?,
-            self.number()?,
-        ];
-        Some((parent, child, [w, x, y, z]))
-    }
+/// Parent, child and rotation of one `geometry_msgs/TransformStamped`.
+fn transform(reader: &mut MessageReader<'_>) -> Option<(String, String, [f64; 4])> {
+    let _stamp = reader.stamp()?;
+    let [parent, child] = [reader.text()?, reader.text()?].map(|name| plain(&name).to_owned());
+    let _translation = [reader.number()?, reader.number()?, reader.number()?];
+    let [x, y, z, w] = [
+        reader.number()?,
+        reader.number()?,
+        reader.number()?,
+        reader.number()?,
+    ];
+    Some((parent, child, [w, x, y, z]))
 }
 
 #[cfg(test)]
@@ -230,7 +164,7 @@ mod tests {
             ("/mast", "/imu_link", imu),
             ("base_link", "camera", camera),
         ];
-        all.take(&mut Reader::ros1(&message(&said))).unwrap();
+        all.take(&mut MessageReader::ros1(&message(&said))).unwrap();
         let close = |found: Turn, expected: Turn| found.angle_to(&expected) < 1e-12;
         assert!(close(
             all.rotation("imu_link", "base_link").unwrap(),
@@ -254,12 +188,12 @@ mod tests {
         let whole = message(&[("a", "b", turn), ("b", "a", turn), ("a", "c", turn)]);
         for length in 0..whole.len() {
             let mut all = StaticTransforms::default();
-            let _ = all.take(&mut Reader::ros1(&whole[..length]));
+            let _ = all.take(&mut MessageReader::ros1(&whole[..length]));
             let _ = all.rotation("c", "nowhere");
         }
         let mut all = StaticTransforms::default();
         let none = Quaternion::assume_unit([0.0; 4]);
-        all.take(&mut Reader::ros1(&message(&[("a", "b", none)])))
+        all.take(&mut MessageReader::ros1(&message(&[("a", "b", none)])))
             .unwrap();
         assert!(all.rotation("b", "a").is_err());
     }

@@ -180,7 +180,7 @@ impl Outlet {
             selectors: streams
                 .iter()
                 .map(|_| match &instants {
-                    Some(instants) => Some(Selector::At(Resampler::new(instants.to_vec()))),
+                    Some(instants) => Some(Selector::At(Resampler::new(instants.clone()))),
                     None => Some(Selector::Rate(out_rate.and_then(Decimator::new)?)),
                 })
                 .collect(),
