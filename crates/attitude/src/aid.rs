@@ -15,6 +15,7 @@
 //! heading of the field -> heading                               heading
 //! correction -> left of the attitude                            update
 //! first force, field -> level, north                            start
+//! headings of other devices -> heading                         outside_heading
 //! vectors at stamps of their own -> those of a gyro sample      beside
 //! first forces -> whether they are specific forces              plausibility
 //! ```
@@ -46,6 +47,7 @@ mod interval;
 mod linear_acceleration;
 mod memory;
 mod other_class;
+mod outside_heading;
 mod plausibility;
 mod prior;
 mod residuals;
@@ -67,6 +69,7 @@ pub use filter::{Filter, Innovation, Report};
 pub use heading::FieldQuality;
 pub use memory::Memory;
 pub use other_class::OtherClass;
+pub use outside_heading::{OutsideHeading, OutsideHeadingCounts};
 pub(crate) use plausibility::is_gravity;
 pub use prior::Prior;
 pub use settings::Settings;

@@ -12,6 +12,7 @@ mod announce;
 mod back_pressure;
 mod complaints;
 mod counters;
+mod heading;
 mod last_attitude;
 mod places;
 mod polling;
@@ -95,6 +96,8 @@ pub struct Sensor {
     stream: SensorStream,
     /// Only one may send a sensor's samples at a time: two gyros in one attitude are no attitude.
     owner: Option<u64>,
+    /// Connection that measures its heading from outside.
+    heading_by: Option<u64>,
     /// Number, among all that was heard of sensors, of its last.
     heard: u64,
     /// Tick at which that was.

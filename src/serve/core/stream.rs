@@ -40,6 +40,7 @@ use stamp_unit::StampUnit;
 use stamps::{Stamps, TimedSamples};
 use std::collections::VecDeque;
 use std::sync::Arc;
+use strapd_attitude::aid::{OutsideHeading, OutsideHeadingCounts};
 use strapd_attitude::condition::{Report, StampRepair};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
@@ -379,6 +380,26 @@ impl SensorStream {
         self.has_unused_forces |= is_alone && raw.accel.is_some();
     }
 
+    /// Takes a heading that something else has measured; `false` where nothing can use it.
+    pub(in crate::serve::core) fn take_heading(
+        &mut self,
+        stamp: Option<Nanos>,
+        measured: OutsideHeading,
+    ) -> bool {
+        self.estimator.take_heading(stamp, measured)
+    }
+
+    /// Headings that something else has measured, for `STATUS`; null of a sensor that none came for.
+    fn outside_headings(&self) -> Option<serde_json::Value> {
+        let counts = self.estimator.outside_headings();
+        (counts != OutsideHeadingCounts::default()).then(|| {
+            serde_json::json!({
+                "used": counts.used, "doubted": counts.doubted,
+                "unpaired": counts.unpaired, "turns": counts.turns,
+            })
+        })
+    }
+
     /// A line that could not be decoded stood here.
     pub fn take_undecodable(&mut self) {
         self.estimator.take_undecodable();
@@ -497,6 +518,7 @@ impl SensorStream {
             "body": self.channel.stream().body_axes,
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
+            "headings": self.outside_headings(),
             "interval_mismatches": self.intervals.found(),
             "warnings": warnings,
             "findings": self.findings(),

@@ -4,10 +4,12 @@
 //! encoder as its output: here are only the objects of the conversation around them
 //! (`docs/protocol.md`).
 
+mod heading;
 mod packing;
 mod reference;
 mod resetting;
 
+pub use heading::MeasuredHeading;
 pub use packing::{broken_packed, packed_stream, unreadable};
 pub use reference::{Reference, TRUTH, stream as reference_stream};
 pub use resetting::{Beginning, Reset, Sensors, posted_reset, reset_answer};
@@ -51,6 +53,8 @@ pub enum Message {
     Playback(Action),
     /// Begin a sensor's attitude anew; or why that cannot be, which is no fault of samples.
     Reset(Result<Reset, Fault>),
+    /// Heading of a sensor, measured by something else; or why it is none, which is no fault of samples.
+    Heading(Result<MeasuredHeading, Fault>),
     /// Reference against which the sensors are compared.
     Reference(Box<Reference>),
     /// Here is the token.
@@ -83,6 +87,12 @@ struct StampObject {
     sec: i64,
     #[serde(default)]
     nsec: u32,
+}
+
+impl StampObject {
+    fn nanos(self) -> Nanos {
+        Nanos::from_sec_nanosec(self.sec, self.nsec)
+    }
 }
 
 #[derive(Deserialize)]
@@ -177,6 +187,7 @@ pub fn read_from(
         }
         Some("WATCH") => watch(line).map(Message::Watch).map_err(request),
         Some("POLL") => Ok(Message::Poll),
+        Some("HEADING") => Ok(Message::Heading(heading::read(line))),
         Some("RESET") => Ok(Message::Reset(resetting::read(line))),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback).map_err(request),
         Some("ATT") if head.id.as_deref() == Some(TRUTH) => {
@@ -190,10 +201,11 @@ pub fn read_from(
         Some(other) => Err(Fault::new(
             "unknown_class",
             format!(
-                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, RESET, PLAYBACK, AUTH"
+                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, RESET, HEADING, PLAYBACK, AUTH"
             ),
         )
         .of(Kind::UnknownClass)),
+        None if let Some(measured) = heading::bare(line) => Ok(Message::Heading(measured)),
         None => Err(Fault::new(
             "no_rate",
             "the line holds no body rate and no class; expected like {\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}",
@@ -225,7 +237,7 @@ fn playback_action(line: &[u8]) -> Result<Action, Fault> {
     match (asked.action.as_str(), asked.at, asked.speed) {
         ("play", ..) => Ok(Action::Play),
         ("pause", ..) => Ok(Action::Pause),
-        ("seek", Some(at), _) => Ok(Action::Seek(Nanos::from_sec_nanosec(at.sec, at.nsec))),
+        ("seek", Some(at), _) => Ok(Action::Seek(at.nanos())),
         ("speed", _, Some(speed)) => Ok(Action::Speed(speed)),
         ("seek", None, _) => Err(bad("seek needs `at`: {\"sec\":1,\"nsec\":0}".to_owned())),
         ("speed", _, None) => Err(bad("`speed` is missing: a factor such as 2.0".to_owned())),

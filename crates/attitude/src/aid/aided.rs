@@ -3,14 +3,16 @@
 use super::beside::VectorPairing;
 use super::calibration::CorrectionMatrices;
 use super::filter::{Filter, Innovation, Measured};
+use super::heading::wrapped;
 use super::other_class::OtherClass;
+use super::outside_heading::{Now, OutsideHeading, OutsideHeadingCounts, OutsideHeadings, Use};
 use super::settings::Settings;
 use super::world::World;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
 
 /// Least sigma of the tilt of an attitude that was saved, rad.
@@ -102,6 +104,11 @@ pub(super) struct StreamState {
     pub(super) fields: VectorPairing,
     #[cfg_attr(feature = "serde", serde(default))]
     pub(super) world: World,
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "OutsideHeadings::is_unused")
+    )]
+    pub(super) headings: OutsideHeadings,
 }
 
 /// A sample and what it was corrected by.
@@ -149,6 +156,7 @@ impl AidedPropagator {
                 forces: None,
                 fields: VectorPairing::with_repeats(),
                 world: World::default(),
+                headings: OutsideHeadings::default(),
             },
             corrected: Vec::new(),
             scratch: Vec::new(),
@@ -238,6 +246,20 @@ impl AidedPropagator {
     /// The same for a magnetic field, any linear unit.
     pub fn take_field(&mut self, stamp: Nanos, field: In<Body>) {
         self.stream.fields.take(stamp, *field.as_vector());
+    }
+
+    /// Takes a heading that something else has measured at `stamp`; without one, at the next sample. It is compared
+    /// there, up to three seconds later. Where no magnetic field tells the heading, the first one, and later ones that
+    /// contradict it for ten seconds, turn the world, which says [`Status::RESET`]; all others correct the heading, and
+    /// by it the bias. Those beyond four sigmas are counted and not used.
+    pub fn take_heading(&mut self, stamp: Option<Nanos>, measured: OutsideHeading) {
+        self.stream.headings.take(stamp, measured);
+    }
+
+    /// Counts of such headings.
+    #[must_use]
+    pub fn outside_headings(&self) -> OutsideHeadingCounts {
+        self.stream.headings.counts
     }
 
     /// The filter, for what it has learned.
@@ -338,6 +360,7 @@ impl AidedPropagator {
         self.propagator.finish(&Sequential, &mut self.scratch);
         self.correct(out);
         self.stream.fields.finish();
+        self.stream.headings.finish();
         if let Some(forces) = &mut self.stream.forces {
             forces.finish();
         }
@@ -416,6 +439,10 @@ impl AidedPropagator {
                     self.set_heading(sample.stamp, &q_nb, heading);
                     status = status.with(Status::RESET);
                 }
+                if !self.stream.headings.is_unused() && self.use_outside_headings(sample, &q_nb, &r)
+                {
+                    status = status.with(Status::RESET);
+                }
             }
             let force = sample.accel.filter(|_| self.gives_acceleration);
             let mut told = self.stream.world.told(AttitudeSample {
@@ -446,7 +473,50 @@ impl AidedPropagator {
             false => heading,
         };
         self.stream.world.set_heading(stamp, attitude, heading);
+        self.stream.headings.begin_anew();
         self.filter.restart_heading();
+    }
+
+    /// Compares the headings from outside up to this sample, whose corrected attitude and matrix are these. Whether the
+    /// world has turned.
+    fn use_outside_headings(
+        &mut self,
+        sample: &AttitudeSample,
+        attitude: &Quaternion<Nav, Body>,
+        r: &Matrix3<f64>,
+    ) -> bool {
+        if !self.filter.is_started() {
+            return false;
+        }
+        let yaw = attitude.yaw_pitch_roll().yaw;
+        let level = r[(0, 0)].powi(2) + r[(1, 0)].powi(2);
+        // Of the body's x axis, seen from above.
+        let nose = r * sample.rate.0.cross(&Vector3::x());
+        let now = Now {
+            stamp: sample.stamp,
+            heading: self.stream.world.heading(yaw),
+            rate: (r[(0, 0)] * nose.y - r[(1, 0)] * nose.x) / level.max(1e-9),
+            steepness: r[(2, 0)],
+            variance: self.filter.heading_variance(),
+            is_free: !self.filter.has_field(),
+        };
+        let mut asked = Vec::new();
+        self.stream.headings.at(&now, &mut asked);
+        let mut has_turned = false;
+        for wanted in asked {
+            match wanted {
+                Use::Correct(off, variance) => self.filter.add_outside_heading(off, variance),
+                Use::Turn(off, variance) => {
+                    let heading = wrapped(now.heading + off);
+                    self.stream
+                        .world
+                        .set_heading(sample.stamp, attitude, heading);
+                    self.filter.know_heading(variance);
+                    has_turned = true;
+                }
+            }
+        }
+        has_turned
     }
 
     /// Takes what was measured at an attitude, which with the correction so far has the matrix `r`. Whether that is
@@ -455,6 +525,7 @@ impl AidedPropagator {
         let (measured, attitude) = (&given.measured, &propagated.q_nb);
         if given.join == Join::Reset {
             self.stream.world.begin_anew();
+            self.stream.headings.begin_anew();
             match self.anew.take() {
                 // Asked for: nothing has happened to the sensor.
                 Some(start) => {

@@ -58,6 +58,34 @@ impl Filter {
         field - self.state.calibration.hard_iron
     }
 
+    /// Adds a heading from outside, by which that of the attitude is off by `off` (rad), of this variance (rad^2).
+    pub(super) fn add_outside_heading(&mut self, off: f64, variance: f64) {
+        let [sum, weight] = &mut self.state.interval.outside;
+        (*sum, *weight) = (*sum + off / variance, *weight + 1.0 / variance);
+    }
+
+    /// The measurement of heading by what came from outside, where it did.
+    pub(super) fn use_outside_heading(&mut self, correction: &mut Correction) {
+        let [sum, weight] = self.state.interval.outside;
+        if weight > 0.0 {
+            let (off, variance) = (sum / weight, 1.0 / weight);
+            self.state
+                .covariance
+                .measure(&[(HEADING, 1.0)], off, variance, correction);
+        }
+    }
+
+    /// The heading is known to this variance (rad^2), and has nothing in common with what else is known.
+    pub(super) fn know_heading(&mut self, variance: f64) {
+        self.state.covariance.restart(HEADING, variance);
+        self.state.interval.outside = [0.0; 2];
+    }
+
+    /// Variance of the heading, rad^2.
+    pub(super) fn heading_variance(&self) -> f64 {
+        self.state.covariance.variance(HEADING)
+    }
+
     /// Hard iron makes the norm of the field change with the attitude.
     fn use_norm(&mut self, correction: &mut Correction) {
         let secs = self.state.interval.secs;
@@ -175,7 +203,7 @@ impl Filter {
 }
 
 /// The same angle in -pi..=pi.
-fn wrapped(angle: f64) -> f64 {
+pub(super) fn wrapped(angle: f64) -> f64 {
     let turns = (angle / TAU).round();
     (angle - turns * TAU).clamp(-PI, PI)
 }

@@ -36,6 +36,16 @@ pub(super) struct Interval {
         serde(default, skip_serializing_if = "crate::aid::calibration::is_nothing")
     )]
     pub(super) by_iron: Vector3<f64>,
+    /// Headings from outside: sums of what they say the heading is off by over its variance, 1/rad, and of one over
+    /// the variance, 1/rad^2.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
+    pub(super) outside: [f64; 2],
+}
+
+/// Whether nothing came of it.
+#[cfg(feature = "serde")]
+fn is_zero(sums: &[f64; 2]) -> bool {
+    *sums == [0.0; 2]
 }
 
 impl Interval {
@@ -54,6 +64,8 @@ impl Interval {
             && vectors.into_iter().all(are_numbers)
             && are_numbers(&self.attitude)
             && are_numbers(self.scaled.iter().flatten())
+            && are_numbers(&self.outside)
+            && is_amount(self.outside[1])
     }
 
     /// The attitude `r` at the end of `secs` in which the mean rate was measured as `rate`.

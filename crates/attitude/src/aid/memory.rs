@@ -103,6 +103,7 @@ impl Memory {
             && filter.vertical.is_plausible()
             && stream.world.is_plausible()
             && filter.drift.is_plausible()
+            && stream.headings.is_bounded()
             && beside.all(VectorPairing::is_bounded)
     }
 }

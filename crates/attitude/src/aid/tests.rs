@@ -4,5 +4,6 @@ mod drift;
 mod golden;
 mod iron;
 mod other_class;
+mod outside_heading;
 mod planar;
 mod probes;

@@ -38,6 +38,7 @@ impl Filter {
         if self.state.interval.fields > 0.0 {
             self.use_field(&mut correction);
         }
+        self.use_outside_heading(&mut correction);
         self.inject(&correction);
         self.widen();
         self.find_class();

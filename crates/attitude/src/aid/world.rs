@@ -36,6 +36,11 @@ impl World {
         self.turns = self.turns.saturating_add(1);
     }
 
+    /// A heading of the filter's world, as it is told now, rad.
+    pub(super) fn heading(&self, yaw: f64) -> f64 {
+        yaw + self.yaw
+    }
+
     /// Returns to the filter's own world, in which an attitude begins anew; the turns stay counted.
     pub(super) fn begin_anew(&mut self) {
         (self.yaw, self.before, self.since) = (0.0, 0.0, None);

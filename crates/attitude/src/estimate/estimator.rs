@@ -6,7 +6,7 @@
 use super::aiding::{self, Forces};
 use super::anew::RestartRequest;
 use super::gyro_watch::GyroWatch;
-use super::integrator::{AuxiliaryVector, Integrator};
+use super::integrator::{Auxiliary, Integrator};
 use super::kept::{Spool, SpoolError};
 use super::magnetometer_watch::MagnetometerWatch;
 use super::meaning::Meaning;
@@ -21,12 +21,12 @@ use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
 use super::smoothing_priors::looseness;
-use crate::aid::{self, AidedPropagator, OtherClass};
+use crate::aid::{self, AidedPropagator, OtherClass, OutsideHeading, OutsideHeadingCounts};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
 use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
-use crate::propagate::{self, Executor, Method, Propagator};
+use crate::propagate::{self, Executor, Method, Propagator, Sequential};
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use crate::smooth::PriorSigmas;
 
@@ -358,6 +358,39 @@ impl Estimator {
         self.integrator.turn_heading(heading)
     }
 
+    /// Takes a heading that something else than the sensor has measured: a course of GNSS, a compass, another tracker, as
+    /// the yaw of the attitudes in their own world; see [`AidedPropagator::take_heading`]. `stamp` is on the clock of the
+    /// samples. `false`, and nothing changes, where nothing can use it: a gyro alone has no vertical to turn about, and a
+    /// smoother takes none.
+    ///
+    /// [`AidedPropagator::take_heading`]: crate::aid::AidedPropagator::take_heading
+    pub fn take_heading(&mut self, stamp: Option<Nanos>, measured: OutsideHeading) -> bool {
+        if !self.integrator.takes_headings() {
+            return false;
+        }
+        self.note(|| Event::OutsideHeading(stamp, measured));
+        let own = OutsideHeading {
+            heading: self.asked.own_heading(measured.heading),
+            ..measured
+        };
+        let is_stamped = stamp.is_some();
+        let stamp = stamp.map_or(Nanos(0), |stamp| self.conditioner.of_auxiliary(stamp));
+        let heading = Auxiliary::Heading {
+            is_stamped,
+            measured: own,
+        };
+        self.beside.push((self.rates.len(), stamp, heading));
+        // However many come before the next sample, they are bounded where they wait.
+        self.make(&Sequential);
+        true
+    }
+
+    /// Counts of such headings.
+    #[must_use]
+    pub fn outside_headings(&self) -> OutsideHeadingCounts {
+        self.integrator.outside_headings()
+    }
+
     /// See [`Conditioner::stamp_of`].
     #[must_use]
     pub fn stamp_of(&self, raw: &RawSample, near: Nanos) -> Option<Nanos> {
@@ -418,8 +451,7 @@ impl Estimator {
         });
         let force = resolved.calibrated_force(force, scale);
         let place = self.rates.len();
-        self.beside
-            .push((place, stamp, AuxiliaryVector::Force(force)));
+        self.beside.push((place, stamp, Auxiliary::Force(force)));
     }
 
     fn take_field(&mut self, raw: &RawSample) {
@@ -436,8 +468,7 @@ impl Estimator {
         let (field, lead) = besides.resolved.field(field);
         let stamp = Nanos(stamp.0.saturating_add((lead * 1e9).round() as i64));
         let place = self.rates.len();
-        self.beside
-            .push((place, stamp, AuxiliaryVector::Field(field)));
+        self.beside.push((place, stamp, Auxiliary::Field(field)));
     }
 
     /// A payload that could not be decoded stood here in the stream.

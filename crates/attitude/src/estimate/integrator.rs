@@ -5,19 +5,24 @@
 use super::anew::RestartRequest;
 use super::kept::{Spool, SpoolError};
 use super::smoothing::{Recording, Smoothing};
-use crate::aid::{self, AidedPropagator};
+use crate::aid::{self, AidedPropagator, OutsideHeading, OutsideHeadingCounts};
 use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample};
 
-/// A vector measured beside the gyro.
+/// Measurement beside the gyro.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum AuxiliaryVector {
+pub(super) enum Auxiliary {
     /// Specific force, m/s^2.
     Force(In<Body>),
     /// Magnetic field.
     Field(In<Body>),
+    /// Heading from outside; with no stamp it is of the next sample.
+    Heading {
+        is_stamped: bool,
+        measured: OutsideHeading,
+    },
 }
 
 /// Rates -> attitudes.
@@ -44,21 +49,41 @@ impl Integrator {
         }
     }
 
-    pub(super) fn take_beside(&mut self, stamp: Nanos, beside: AuxiliaryVector) {
+    pub(super) fn take_beside(&mut self, stamp: Nanos, beside: Auxiliary) {
         match (self, beside) {
             (Integrator::Alone(_), _) => {}
-            (Integrator::Aided(aided), AuxiliaryVector::Force(force)) => {
-                aided.take_force(stamp, force)
+            (Integrator::Aided(aided), Auxiliary::Force(force)) => aided.take_force(stamp, force),
+            (Integrator::Aided(aided), Auxiliary::Field(field)) => aided.take_field(stamp, field),
+            (
+                Integrator::Aided(aided),
+                Auxiliary::Heading {
+                    is_stamped,
+                    measured,
+                },
+            ) => {
+                aided.take_heading(is_stamped.then_some(stamp), measured);
             }
-            (Integrator::Aided(aided), AuxiliaryVector::Field(field)) => {
-                aided.take_field(stamp, field)
-            }
-            (Integrator::Smoothed(smoothing), AuxiliaryVector::Force(force)) => {
+            (Integrator::Smoothed(smoothing), Auxiliary::Force(force)) => {
                 smoothing.take_force(stamp, force);
             }
-            (Integrator::Smoothed(smoothing), AuxiliaryVector::Field(field)) => {
+            (Integrator::Smoothed(smoothing), Auxiliary::Field(field)) => {
                 smoothing.take_field(stamp, field);
             }
+            // Not offered: see `takes_headings`.
+            (Integrator::Smoothed(_), Auxiliary::Heading { .. }) => {}
+        }
+    }
+
+    /// Whether headings from outside correct anything: there is a vertical to turn about, and no recording to smooth.
+    pub(super) fn takes_headings(&self) -> bool {
+        matches!(self, Integrator::Aided(_))
+    }
+
+    /// Counts of them.
+    pub(super) fn outside_headings(&self) -> OutsideHeadingCounts {
+        match self {
+            Integrator::Aided(aided) => aided.outside_headings(),
+            Integrator::Alone(_) | Integrator::Smoothed(_) => OutsideHeadingCounts::default(),
         }
     }
 

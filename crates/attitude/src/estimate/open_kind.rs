@@ -10,6 +10,7 @@ use super::meaning::Meaning;
 use super::plan::EstimationSettings;
 use super::preparation::Prepared;
 use super::sample_kind::{KindChoice, OrdinaryStep, STEPS_LIVE};
+use crate::aid::OutsideHeading;
 use crate::condition;
 use crate::propagate::Sequential;
 use crate::record::{AttitudeSample, Nanos, RawSample};
@@ -27,6 +28,7 @@ pub(super) enum Event {
     ContinueCounts(Box<condition::Report>, u32),
     Restart(Box<RestartRequest>),
     Heading(f64),
+    OutsideHeading(Option<Nanos>, OutsideHeading),
 }
 
 /// Beginning of a stream whose kind is not decided for good.
@@ -81,8 +83,10 @@ impl OpenKind {
 impl Estimator {
     /// Notes an event, as long as the kind is not decided for good.
     pub(super) fn note(&mut self, event: impl FnOnce() -> Event) {
-        if let Some(open) = &mut self.open {
-            open.events.push(event());
+        match &mut self.open {
+            Some(open) if open.events.len() >= MOST => self.open = None,
+            Some(open) => open.events.push(event()),
+            None => {}
         }
     }
 
@@ -155,6 +159,9 @@ impl Estimator {
             Event::Restart(anew) => self.begin_anew(anew),
             Event::Heading(heading) => {
                 self.turn_heading(*heading);
+            }
+            Event::OutsideHeading(stamp, measured) => {
+                self.take_heading(*stamp, *measured);
             }
         }
     }

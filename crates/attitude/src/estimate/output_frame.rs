@@ -3,7 +3,7 @@
 use super::plan::{EstimationSettings, Initial};
 use super::preparation::Prepared;
 use crate::aid;
-use crate::frames::{In, Nav};
+use crate::frames::{Body, In, Nav};
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeSample, LinearAcceleration};
 use crate::worlds::{Convention, World};
@@ -65,6 +65,19 @@ impl OutputFrame {
                 *sample = relabelled(sample, Convention::EnuFlu, to);
             }
         }
+    }
+
+    /// Heading (rad) of a body in the world asked for, as it is computed.
+    pub(super) fn own_heading(&self, asked: f64) -> f64 {
+        let turn = RotationVector(Vector3::z() * asked);
+        let mut level = Quaternion::<Nav, Body>::from_rotation_vector(&turn);
+        if let Some(from) = self.world.convention() {
+            level = from.convert(Convention::EnuFlu, level);
+        }
+        if let Some(north) = &self.north {
+            level = north.inverse() * level;
+        }
+        level.yaw_pitch_roll().yaw
     }
 
     /// An attitude that was asked for, as it was computed.

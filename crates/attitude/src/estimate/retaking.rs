@@ -5,7 +5,7 @@
 //! where it was a spike, that is taken once more without it. Attitudes that have left stay as they were.
 
 use super::gyro_watch::GyroWatch;
-use super::integrator::{AuxiliaryVector, Integrator};
+use super::integrator::{Auxiliary, Integrator};
 use super::magnetometer_watch::MagnetometerWatch;
 use crate::condition::regularise::Regulariser;
 use crate::condition::{Revised, Revision};
@@ -37,7 +37,7 @@ struct Doubted {
 #[derive(Clone, Copy, Debug)]
 enum Input {
     Rate(RateSample),
-    Beside(Nanos, AuxiliaryVector),
+    Beside(Nanos, Auxiliary),
     Heading(f64),
 }
 
@@ -57,7 +57,7 @@ pub(super) struct Stages<'a> {
 }
 
 /// Vectors that came between the rates, each before the rate of this number.
-pub(super) type Besides = Vec<(usize, Nanos, AuxiliaryVector)>;
+pub(super) type Besides = Vec<(usize, Nanos, Auxiliary)>;
 
 impl Doubted {
     fn new(integrator: Integrator, regulariser: Option<Regulariser>) -> Doubted {
@@ -95,7 +95,7 @@ impl Stages<'_> {
     fn watch(&mut self, input: &Input) {
         match input {
             Input::Rate(rate) => self.watch_rates(std::slice::from_ref(rate)),
-            Input::Beside(stamp, AuxiliaryVector::Force(force)) => {
+            Input::Beside(stamp, Auxiliary::Force(force)) => {
                 if let Some(watch) = self.gyro {
                     watch.take_force(*stamp, *force);
                 }
@@ -103,7 +103,8 @@ impl Stages<'_> {
                     watch.take_force(*stamp, *force);
                 }
             }
-            Input::Beside(_, AuxiliaryVector::Field(_)) | Input::Heading(_) => {}
+            Input::Beside(_, Auxiliary::Field(_) | Auxiliary::Heading { .. })
+            | Input::Heading(_) => {}
         }
     }
 
@@ -156,7 +157,7 @@ impl Retaking {
         left
     }
 
-    fn push_beside(&mut self, stages: &mut Stages<'_>, stamp: Nanos, beside: AuxiliaryVector) {
+    fn push_beside(&mut self, stages: &mut Stages<'_>, stamp: Nanos, beside: Auxiliary) {
         let input = Input::Beside(stamp, beside);
         match &mut self.doubted {
             None => stages.watch(&input),

@@ -42,6 +42,10 @@ pub struct Counters {
     pub resets: AtomicU64,
     /// Number of such requests that were refused.
     pub refused_resets: AtomicU64,
+    /// Headings from outside that were taken.
+    pub headings: AtomicU64,
+    /// Number of those that were refused.
+    pub refused_headings: AtomicU64,
     /// Attitudes made.
     pub attitudes: AtomicU64,
 }
@@ -61,7 +65,7 @@ impl Hub {
 impl Counters {
     /// Each, in a fixed order.
     #[must_use]
-    pub fn named(&self) -> [Counter; 16] {
+    pub fn named(&self) -> [Counter; 18] {
         let counter = |name, counts, n: &AtomicU64| Counter {
             name,
             counts,
@@ -138,6 +142,12 @@ impl Counters {
                 "resets_refused",
                 "RESET requests refused: of another's sensor, of none there is, or to an attitude that cannot be.",
                 &self.refused_resets,
+            ),
+            counter("headings", "Headings from outside taken.", &self.headings),
+            counter(
+                "headings_refused",
+                "Headings from outside refused: no such sensor, or none that can use one, or measured by another connection.",
+                &self.refused_headings,
             ),
             counter(
                 "attitudes",

@@ -115,6 +115,7 @@ impl Hub {
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
+            heading_by: None,
             heard: self.sensors.heard.fetch_add(1, Ordering::Relaxed),
             heard_at: self.sensors.tick.load(Ordering::Relaxed),
             gave_way: false,

@@ -93,6 +93,13 @@ impl Session {
         self.step.asked |= !matches!(request, Message::Reference(_));
         match request {
             Message::Reset(asked) => return self.reset(asked, number, line),
+            Message::Heading(measured) => {
+                // Well said, if in vain: not held against it.
+                return match self.hub.heading(measured, &self.client) {
+                    Ok(()) => self.errors_in_a_row = 0,
+                    Err(fault) => self.say(&fault.of(Kind::Request), number, line),
+                };
+            }
             Message::Watch(_) | Message::Poll if self.side.is_deaf() => {}
             Message::Watch(filter) => return self.watch(filter, said, received, scratch),
             Message::Poll => self.poll(),
