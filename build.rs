@@ -59,6 +59,7 @@ fn main() -> io::Result<()> {
             is_program("node")
                 && Path::new("target/foxglove/node_modules/@foxglove/ws-protocol").is_dir(),
         ),
+        ("has_cxx", is_program("c++")),
         ("has_nginx", is_program("nginx") && is_program("openssl")),
         ("has_python", is_program("python3")),
         ("has_systemd", is_program("systemd-analyze")),
