@@ -35,8 +35,8 @@ fn likelihood(information: &Matrix, told: &Vector, prior: &Matrix) -> Option<f64
 
 impl Filter {
     /// Logarithm of how many times likelier what was measured is of a sensor with the priors of this filter than of one
-    /// with those of `other`; 0 where nothing can be said.
-    pub(crate) fn likelier_than(&self, other: &OtherClass) -> f64 {
+    /// with those of `other`; `None` where nothing can be said.
+    pub(crate) fn likelier_than(&self, other: &OtherClass) -> Option<f64> {
         let numbers = [
             self.calibration().scale,
             self.calibration().cross,
@@ -48,12 +48,12 @@ impl Filter {
         let own = prior(&OtherClass::of(self.settings()));
         let log = covariance.try_inverse().and_then(|known| {
             // Accelerations are not white: what was measured tells less than it seems to.
-            let information = (known - own) / COLOURED;
+            let information = (known - prior(&self.held())) / COLOURED;
             let told = known * found / COLOURED;
             let of = |prior: &Matrix| likelihood(&information, &told, prior);
             Some(of(&own)? - of(&prior(other))?)
         });
-        log.filter(|log| log.is_finite()).unwrap_or(0.0)
+        log.filter(|log| log.is_finite())
     }
 
     /// Lets the attitude be less sure by a class that the sensor may be of instead.
@@ -87,7 +87,9 @@ impl Filter {
         if let Some(doubt) = &self.derived.doubt
             && self.state.report.updates.is_multiple_of(OFTEN)
         {
-            self.state.class_log = -self.likelier_than(&doubt.other);
+            if let Some(log) = self.likelier_than(&doubt.other) {
+                self.state.class_log = -log;
+            }
             self.weigh_classes();
         }
     }
@@ -109,12 +111,18 @@ impl Filter {
         1.0 / (1.0 + (-self.state.class_log).exp())
     }
 
-    fn weights(&self, other: &OtherClass, probability: f64) -> [f64; NUMBERS] {
+    /// Priors that the covariance began with, or goes on with since it was widened.
+    fn held(&self) -> OtherClass {
         let mut own = OtherClass::of(&self.settings);
         if self.state.is_widened {
-            (own.scale_prior, own.cross_prior) = (WIDE, WIDE);
+            own.scale_prior = own.scale_prior.max(WIDE);
+            own.cross_prior = own.cross_prior.max(WIDE);
         }
-        let [own, other] = [own, *other].map(|class| class.sigmas().map(|sigma| sigma * sigma));
+        own
+    }
+
+    fn weights(&self, other: &OtherClass, probability: f64) -> [f64; NUMBERS] {
+        let [own, other] = [self.held(), *other].map(|class| class.sigmas().map(|sigma| sigma * sigma));
         std::array::from_fn(|i| probability * (other[i] - own[i]).max(0.0) / (own[i] * own[i]))
     }
 }

@@ -150,7 +150,8 @@ impl ClassPass {
         rests.take(&attitudes);
         let filter = aided.filter();
         let off_at_rest = rests.farthest();
-        let by_motion = filter.likelier_than(&OtherClass::of(&run.aiding.settings));
+        let other = OtherClass::of(&run.aiding.settings);
+        let by_motion = filter.likelier_than(&other).unwrap_or(0.0);
         Some(Evidence {
             log: by_motion + off_at_rest.map_or(0.0, by_length),
             found: *filter.calibration(),

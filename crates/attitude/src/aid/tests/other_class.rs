@@ -58,3 +58,23 @@ fn a_body_that_turns_every_way_tells_the_class_on_the_way() {
     let after = run.filter.other_class_probability();
     assert!(before == 0.5 && after < 0.2, "{before} {after}");
 }
+
+#[test]
+fn a_gyro_far_off_its_class_is_told_to_be_of_the_other_though_its_prior_was_widened() {
+    let mut run = Run::new(Settings::default());
+    run.filter.may_be_of(OTHER);
+    let (mut told, mut widened) = (0.5, 0);
+    for k in 0..=60_000 {
+        let (rate, force, _) = sample(k);
+        let off = rate.component_mul(&Vector3::new(1.03, 0.98, 1.02));
+        run.take(k as f64 * 0.01, off, Some(force), None);
+        if run.filter.is_beyond_class() && k % 100 == 0 {
+            let probability = run.filter.other_class_probability();
+            widened += 1;
+            // Where nothing can be said, what was said before stays.
+            assert!(probability > 0.4 && probability > told - 0.2, "{k} {probability}");
+            told = probability;
+        }
+    }
+    assert!(widened > 400 && told > 0.999, "{widened} {told}");
+}
