@@ -8,6 +8,7 @@ use serial2_tokio::SerialPort;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 use strapd_recording::text::printable;
 
 /// Rate of a port that no address states.
@@ -108,6 +109,47 @@ impl SerialPlace {
             "{bytes} bytes at {} baud and no line that can be read in 2 s: the board has another rate? ?baud=RATE states it, usual are {USUAL}",
             self.baud
         )
+    }
+}
+
+/// Share of what a port can carry, a tenth of its rate in bytes, from which on it is full: no board sends so much by
+/// chance, and its clock may be off by 2 %.
+const FULL: std::ops::RangeInclusive<f64> = 0.985..=1.02;
+/// Time over which bytes are counted, and how often in a row the port must be full.
+const COUNTED: Duration = Duration::from_secs(2);
+const IN_A_ROW: u32 = 2;
+
+/// Bytes of a port against what it can carry.
+#[derive(Debug, Default)]
+pub struct PortLoad {
+    since: Option<Instant>,
+    bytes: usize,
+    full: u32,
+    is_told: bool,
+}
+
+impl PortLoad {
+    /// Takes so many bytes that came at `now`; in words, once, that the port carries no more.
+    pub fn take(&mut self, place: &SerialPlace, bytes: usize, now: Instant) -> Option<String> {
+        let since = *self.since.get_or_insert(now);
+        let passed = now.saturating_duration_since(since);
+        if passed < COUNTED {
+            self.bytes += bytes;
+            return None;
+        }
+        let rate = self.bytes as f64 / passed.as_secs_f64();
+        (self.since, self.bytes) = (Some(now), bytes);
+        let most = f64::from(place.baud) / 10.0;
+        // A port of USB itself has a rate in name only.
+        let is_full = FULL.contains(&(rate / most)) && !place.sensor().starts_with("ttyACM");
+        self.full = if is_full { self.full + 1 } else { 0 };
+        if self.full < IN_A_ROW || std::mem::replace(&mut self.is_told, true) {
+            return None;
+        }
+        Some(format!(
+            "{rate:.0} bytes a second are all that {} baud carry: what the board cannot send it delays or leaves out; a higher rate on both sides (?baud=), fewer samples or shorter lines",
+            place.baud
+        ))
     }
 }
 
@@ -296,6 +338,33 @@ mod tests {
         );
         let why = missing.explained(&io::ErrorKind::ResourceBusy.into());
         assert!(why.contains("another program"), "{why}");
+    }
+
+    #[test]
+    fn a_port_that_carries_no_more_is_named_once_and_one_with_room_never() {
+        let begin = Instant::now();
+        let told = |name: &str, baud: u32, rate: usize| {
+            let place = SerialPlace {
+                port: PathBuf::from("/dev").join(name),
+                baud,
+            };
+            let mut load = PortLoad::default();
+            // Fifty times a second, for twenty seconds.
+            let each = |n: u32| load.take(&place, rate / 50, begin + n * Duration::from_millis(20));
+            (0..1000).filter_map(each).collect::<Vec<_>>()
+        };
+        let full = told("ttyUSB0", 9600, 950);
+        assert_eq!(full.len(), 1, "{full:?}");
+        assert!(full[0].contains("9600 baud"), "{full:?}");
+        for (name, baud, rate) in [
+            ("ttyUSB0", 9600, 850),
+            ("ttyUSB0", 9600, 2000),
+            ("ttyUSB0", 115_200, 950),
+            ("ttyACM0", 9600, 950),
+            ("ttyUSB0", 9600, 0),
+        ] {
+            assert!(told(name, baud, rate).is_empty(), "{name} {baud} {rate}");
+        }
     }
 
     #[test]

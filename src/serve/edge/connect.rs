@@ -8,7 +8,7 @@
 use super::source::{Protocol, Source};
 use crate::client::link::{Heard, Link};
 use crate::client::remote::Remote;
-use crate::client::serial::{Legibility, SerialPlace};
+use crate::client::serial::{Legibility, PortLoad, SerialPlace};
 use crate::serve::core::hub::{Flood, Hub};
 use crate::serve::core::outgoing::Outgoing;
 use crate::serve::core::read_buffer::{now, with_read_buffer};
@@ -102,6 +102,7 @@ async fn converse(
         asked_again: false,
         flood: Flood::default(),
         legibility: serial(source).map(|_| Legibility::default()),
+        load: PortLoad::default(),
     };
     talk.go_on(running).await.err()
 }
@@ -121,6 +122,8 @@ struct Talk<'c> {
     flood: Flood,
     /// Bytes of a serial port, until it is known whether they can be read.
     legibility: Option<Legibility>,
+    /// Bytes of a serial port against its rate.
+    load: PortLoad,
 }
 
 impl Talk<'_> {
@@ -213,6 +216,11 @@ impl Talk<'_> {
             Ok(heard) => {
                 if let Some(seen) = &mut self.legibility {
                     seen.take(&self.bytes);
+                }
+                if let Some(place) = serial(self.source)
+                    && let Some(what) = self.load.take(place, self.bytes.len(), Instant::now())
+                {
+                    self.outgoing.complain_of("baud", &what);
                 }
                 take(&mut self.session, &heard, &self.bytes, self.outgoing).await;
                 match heard {

@@ -136,6 +136,32 @@ fn a_wrong_rate_and_a_port_that_is_none_say_so_in_the_log() {
     end(none);
 }
 
+/// A wire at 9600 baud hands on 960 bytes a second, however much the board would send.
+#[test]
+fn a_rate_that_carries_no_more_is_said_in_the_log() {
+    let mut board = Board::new();
+    let process = serving(&format!("serial://{}?baud=9600", board.port.display()));
+    board.send(&format!("{HEADER}\n"));
+    let begin = Instant::now();
+    let (mut sent, mut n) = (0.0, 0);
+    let error = |process: &Process| status(process)["outgoing"][0]["last_error"].to_string();
+    while begin.elapsed() < Duration::from_secs(60) && !error(&process).contains("9600 baud carry")
+    {
+        while sent < 955.0 * begin.elapsed().as_secs_f64() {
+            let row = Board::row(n);
+            board.send(&row);
+            (sent, n) = (sent + row.len() as f64, n + 1);
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(
+        error(&process).contains("9600 baud carry"),
+        "{}",
+        error(&process)
+    );
+    end(process);
+}
+
 /// Runs a command on a board that sends 200 rows a second for as long as it runs.
 fn output(args: &[&str], board: &mut Board) -> (Option<i32>, String) {
     let head = format!("5,0.1\n{HEADER}\n");

@@ -122,7 +122,8 @@ impl Filter {
     }
 
     fn weights(&self, other: &OtherClass, probability: f64) -> [f64; NUMBERS] {
-        let [own, other] = [self.held(), *other].map(|class| class.sigmas().map(|sigma| sigma * sigma));
+        let [own, other] =
+            [self.held(), *other].map(|class| class.sigmas().map(|sigma| sigma * sigma));
         std::array::from_fn(|i| probability * (other[i] - own[i]).max(0.0) / (own[i] * own[i]))
     }
 }

@@ -72,7 +72,10 @@ fn a_gyro_far_off_its_class_is_told_to_be_of_the_other_though_its_prior_was_wide
             let probability = run.filter.other_class_probability();
             widened += 1;
             // Where nothing can be said, what was said before stays.
-            assert!(probability > 0.4 && probability > told - 0.2, "{k} {probability}");
+            assert!(
+                probability > 0.4 && probability > told - 0.2,
+                "{k} {probability}"
+            );
             told = probability;
         }
     }
