@@ -135,6 +135,10 @@ impl Retaking {
         (besides, revisions): (Besides, Vec<Revised>),
         exec: &impl Executor,
     ) -> u64 {
+        if self.doubted.is_none() && revisions.is_empty() && stages.regulariser.is_none() {
+            self.integrate_at_once(stages, rates, besides, exec);
+            return 0;
+        }
         let mut revisions = revisions.into_iter().peekable();
         let (mut from, mut left) = (0, 0);
         for (place, stamp, beside) in besides {
@@ -157,6 +161,41 @@ impl Retaking {
         left
     }
 
+    /// The same where nothing is in doubt. A vector newer than the rates before it waits where it is paired with a rate, so
+    /// that it may be given before them: rates are integrated together, and the bits are those of one after the other.
+    fn integrate_at_once(
+        &mut self,
+        stages: &mut Stages<'_>,
+        rates: &mut [RateSample],
+        besides: Besides,
+        exec: &impl Executor,
+    ) {
+        let mut from = 0;
+        for (place, stamp, beside) in &besides {
+            stages.watch_rates(rates.get(from..*place).unwrap_or_default());
+            stages.watch(&Input::Beside(*stamp, *beside));
+            from = *place;
+        }
+        stages.watch_rates(rates.get(from..).unwrap_or_default());
+        let (mut from, mut seen, mut early) = (0, 0, 0);
+        let mut newest = Nanos(i64::MIN);
+        for (place, stamp, beside) in besides {
+            let between = rates.get(seen..place).unwrap_or_default();
+            newest = between
+                .iter()
+                .fold(newest, |newest, rate| newest.max(rate.stamp));
+            seen = place;
+            if place > from && (stamp <= newest || early >= MOST) {
+                self.integrate_rates(stages, rates, (from, place), exec);
+                (from, early) = (place, 0);
+            }
+            early += 1;
+            stages.integrator.take_beside(stamp, beside);
+        }
+        let count = rates.len();
+        self.integrate_rates(stages, rates, (from, count), exec);
+    }
+
     fn push_beside(&mut self, stages: &mut Stages<'_>, stamp: Nanos, beside: Auxiliary) {
         let input = Input::Beside(stamp, beside);
         match &mut self.doubted {
@@ -170,8 +209,24 @@ impl Retaking {
         }
     }
 
-    /// Integrates the rates of these numbers.
+    /// Takes the rates of these numbers.
     fn push(
+        &mut self,
+        stages: &mut Stages<'_>,
+        rates: &mut [RateSample],
+        (from, to): (usize, usize),
+        exec: &impl Executor,
+    ) {
+        let new = rates.get(from..to).unwrap_or_default();
+        match &mut self.doubted {
+            None => stages.watch_rates(new),
+            Some(doubted) => doubted.since.extend(new.iter().copied().map(Input::Rate)),
+        }
+        self.integrate_rates(stages, rates, (from, to), exec);
+    }
+
+    /// Integrates the rates of these numbers.
+    fn integrate_rates(
         &mut self,
         stages: &mut Stages<'_>,
         rates: &mut [RateSample],
@@ -181,10 +236,6 @@ impl Retaking {
         let Some(rates) = rates.get_mut(from..to) else {
             return;
         };
-        match &mut self.doubted {
-            None => stages.watch_rates(rates),
-            Some(doubted) => doubted.since.extend(rates.iter().copied().map(Input::Rate)),
-        }
         let rates = match stages.regulariser {
             None => rates,
             Some(regulariser) => {
