@@ -4,7 +4,7 @@ use crate::condition::spikes::tests::{add, conditioned, hand, rate};
 use crate::condition::{Settings, SpikePolicy};
 use crate::estimate::{Aid, EstimationSettings, Estimator, Meaning, RestartRequest, at_once};
 use crate::propagate::{Method, Sequential};
-use crate::record::{AttitudeSample, Declared, RawSample, SampleKind, Status};
+use crate::record::{AttitudeSample, Declared, Nanos, RawSample, SampleKind, Status};
 
 const HZ: usize = 200;
 
@@ -240,4 +240,57 @@ fn a_reset_a_heading_and_a_saved_state_amid_a_doubt_go_on_sanely() {
     let reset = rest(&mut reset);
     assert!(reset[0].status.has(Status::RESET) && reset[0].q_nb.wxyz()[0] > 0.999);
     assert!(reset.iter().all(|a| !a.status.has(Status::REPAIRED)));
+}
+
+/// Fields at stamps of their own among the samples: in order, late, far ahead, doubled, and a clock that is set back.
+fn with_fields(raw: Vec<RawSample>) -> Vec<RawSample> {
+    let mut all = Vec::new();
+    for (n, sample) in raw.into_iter().enumerate() {
+        let jumped = n > 2000;
+        let mut stamp = sample.header.unwrap_or_default();
+        let sample = RawSample {
+            header: Some(Nanos(stamp.0 - i64::from(jumped) * 40_000_000_000)),
+            ..sample
+        };
+        stamp = sample.header.unwrap_or_default();
+        let by = match n % 11 {
+            3 => -12_000_000,
+            5 => 7_000_000,
+            8 => 300_000_000,
+            9 => -700_000_000,
+            _ => 0,
+        };
+        let angle = 0.01 * n as f64;
+        let field = RawSample {
+            header: Some(Nanos(stamp.0 + by)),
+            log: sample.log,
+            publish: sample.publish,
+            mag: Some([20.0 * angle.cos(), 20.0 * angle.sin(), -40.0]),
+            is_beside: true,
+            ..RawSample::default()
+        };
+        if n % 2 == 0 {
+            all.push(field);
+        }
+        all.push(sample);
+        if n % 13 == 6 {
+            all.push(field);
+        }
+    }
+    all
+}
+
+#[test]
+fn however_much_comes_at_once_the_bits_are_those_of_one_after_the_other() {
+    let raw = with_fields(hand(20, HZ));
+    for kind in [SampleKind::Rate, SampleKind::Average] {
+        let plan = plan(Aid::GravityAndField, kind, SpikePolicy::Repair);
+        let first = raw.iter().find(|raw| !raw.is_beside).unwrap();
+        let of = |piece: usize| attitudes(&mut live(&plan, first), &raw, piece);
+        let expected = of(1);
+        assert!(expected.len() > 3900, "{}", expected.len());
+        for piece in [7, 100, raw.len()] {
+            assert!(of(piece) == expected, "{kind:?} in pieces of {piece}");
+        }
+    }
 }
