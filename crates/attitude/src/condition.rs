@@ -23,7 +23,7 @@
 //! | several on every stamp: a coarse clock | spread over its step, equal ones too, the first ones at the end of theirs | `Restamped` |
 //! | overtaken on its way, by no more than the window | put back | `Reordered` |
 //! | ... by more | dropped | `Late` |
-//! | a counter wraps (16, 24, 32 bits, a day, a week) | stamps go on, counted and shown | `Accepted` |
+//! | a counter wraps (16, 24, 30, 31, 32 bits, a day, a week) | stamps go on, counted and shown | `Accepted` |
 //! | clock set ahead or back, by the arrival clock | stamps go on where they were, counted and shown | `Accepted` |
 //! | clock set back, and it stays so | held (or reset), integration goes on behind it | `Accepted` |
 //! | one stamp far ahead, the rest carries on before it | dropped | `StrayStamp` |

@@ -1,7 +1,7 @@
 //! Stamps of a counter that wraps -> stamps that go on. Pure.
 //!
 //! A stage of its own because a counter that begins again looks like a clock that was set back, and only the numbers of
-//! counters tell the two apart: a period of 16, 24 or 32 bits, a day or a week, left near its top (`docs/theory/clocks.md`).
+//! counters tell the two apart: a period of 16, 24, 30 (MicroPython), 31 or 32 bits, a day or a week, left near its top (`docs/theory/clocks.md`).
 
 use super::line::median_of;
 
@@ -14,7 +14,7 @@ const UNITS: [(i64, &str); 5] = [
     (1_000_000, "ms"),
 ];
 /// Widths of counters, bits.
-const BITS: [u32; 3] = [16, 24, 32];
+const BITS: [u32; 5] = [16, 24, 30, 31, 32];
 /// Periods of times of day and of GPS, nanoseconds.
 const CALENDAR: [(i64, &str); 2] = [
     (86_400_000_000_000, "a day"),
@@ -236,6 +236,9 @@ mod tests {
             (1, 32, (1 << 32) - 60_000_000, false, 12),
             (1_000_000, 16, 65_500, false, 8),
             (1_000, 32, (1 << 31) - 100_000, true, 20),
+            // `ticks_us` of MicroPython; `micros() & 0x7fffffff`.
+            (1_000, 30, (1 << 30) - 50_000, false, 10),
+            (1_000, 31, (1 << 31) - 100_000, false, 20),
         ];
         for (unit, bits, first, is_signed, at) in cases {
             let mut turns = Turns::default();
