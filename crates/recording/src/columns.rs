@@ -13,7 +13,7 @@ mod units;
 pub use cells::Delimiter;
 pub use given::Columns;
 pub(crate) use given::{Given, Role};
-pub(crate) use names::{Kind, Meant, Name};
+pub(crate) use names::{Kind, Meant, Name, words};
 pub use rows::RowFilter;
 pub(crate) use rows::RowSelection;
 pub(crate) use units::{Quantity, Unit};

@@ -220,7 +220,18 @@ const STAMP_WEAK: &[&str] = &[
 ];
 
 /// Names of a time of day, and of its date.
-const TIMES_OF_DAY: &[&str] = &["rtctime", "timeofday", "localtime", "clocktime", "gpstime"];
+const TIMES_OF_DAY: &[&str] = &[
+    "rtctime",
+    "timeofday",
+    "localtime",
+    "clocktime",
+    "gpstime",
+    "datetime",
+    "dateandtime",
+    "utcdatetime",
+    "localdatetime",
+    "recordedat",
+];
 const DATES: &[&str] = &[
     "date",
     "rtcdate",
@@ -250,9 +261,12 @@ const SENSOR: &[&str] = &[
     "serial",
     "serialnumber",
     "nodeid",
+    "placement",
+    "bodypart",
+    "limb",
 ];
 /// The same of one that may as well be a number of the row, or of something else.
-const SENSOR_OR_NUMBER: &[&str] = &["id", "instance", "node", "address", "unit"];
+const SENSOR_OR_NUMBER: &[&str] = &["id", "instance", "node", "address", "addr", "unit"];
 
 /// Whether a name, without what is between its words, says whose a row is, and whether that is clear.
 fn names_sensor(joined: &str) -> Option<bool> {
@@ -263,7 +277,7 @@ fn names_sensor(joined: &str) -> Option<bool> {
 }
 
 /// Words of a name: cut at what is neither letter nor digit, and where capitals begin.
-fn words(text: &str) -> Vec<String> {
+pub(crate) fn words(text: &str) -> Vec<String> {
     let mut words = Vec::new();
     let mut word = String::new();
     let mut before = ' ';

@@ -7,6 +7,9 @@ use super::time_of_day::Daily;
 use crate::decode::{decimal_in_steps, instant_of_date};
 use strapd_attitude::record::Nanos;
 
+/// Nanoseconds of a second.
+const SECOND: i64 = 1_000_000_000;
+
 /// Clock by which the rows of a table are placed in time.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) enum Clock {
@@ -18,6 +21,8 @@ pub(super) enum Clock {
     Dates,
     /// A column of times of day.
     Daily(Daily),
+    /// A column of parts of a second, so many nanoseconds each, beside one of whole seconds.
+    Split { nanos: i64 },
     /// A column of running numbers, so far apart.
     Counter { period: f64, wraps: Wraps },
     /// A column of steps since the row before, so many nanoseconds in one; their sum until now.
@@ -84,6 +89,10 @@ impl Clock {
             }
             Clock::Dates => instant_of_date(number).ok_or("is no date (RFC 3339)"),
             Clock::Daily(daily) => daily.read(number).ok_or("is no time of day"),
+            Clock::Split { nanos } => whole()
+                .filter(|part| (0..SECOND / *nanos).contains(part))
+                .map(|part| Nanos(part * *nanos))
+                .ok_or("is no part of a second"),
             Clock::Counter { period, wraps } => {
                 let count = whole().ok_or("is no whole number")?;
                 Ok(at(wraps.unwrapped(count), *period))
@@ -100,10 +109,15 @@ impl Clock {
         }
     }
 
-    /// Midnight of the date in another column than the time.
+    /// Midnight of the date, or the whole second, in another column.
     pub(super) fn day(&self, cell: &str) -> Result<Nanos, &'static str> {
         match self {
             Clock::Daily(daily) => daily.day(cell).ok_or("is no date like those above"),
+            Clock::Split { .. } => cell
+                .trim()
+                .parse()
+                .map(|second: i64| Nanos(second.saturating_mul(SECOND)))
+                .map_err(|_| "is no whole second"),
             _ => Ok(Nanos(0)),
         }
     }
@@ -112,6 +126,7 @@ impl Clock {
     pub(super) fn instant(&self, stamp: Option<Nanos>, day: Option<Nanos>) -> Option<Nanos> {
         match self {
             Clock::Daily(daily) if daily.needs_day() => Some(Nanos(stamp?.0 + day?.0)),
+            Clock::Split { .. } => Some(Nanos(stamp?.0.saturating_add(day?.0))),
             _ => stamp,
         }
     }

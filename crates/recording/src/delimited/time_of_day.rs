@@ -91,9 +91,12 @@ pub(super) fn since_midnight(text: &str) -> Option<Nanos> {
     };
     let mut parts = clock.trim_end().split(':');
     let (hour, minute, second) = (parts.next()?, parts.next()?, parts.next()?);
-    let (second, fraction) = match second.split_once(['.', ',']) {
-        Some((second, fraction)) => (second, fraction),
-        None => (second, ""),
+    let (second, fraction) = match (second.split_once(['.', ',']), parts.next()) {
+        (Some((second, fraction)), None) => (second, fraction),
+        (None, None) => (second, ""),
+        // Milliseconds behind a colon; two digits would be a camera's frames.
+        (None, Some(millis)) if millis.len() == 3 => (second, millis),
+        (_, Some(_)) => return None,
     };
     let number = |text: &str| -> Option<i64> {
         let is_plain = (1..=2).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit());
@@ -231,6 +234,9 @@ mod tests {
             ("12:60:00", None),
             ("12:00", None),
             ("12:00:00:00", None),
+            ("12:00:00:025", Some(43_200_025)),
+            ("12:00:00.1:025", None),
+            ("12:00:00:025:1", None),
             ("12:00:0x", None),
             ("12:00:00.-5", None),
         ] {

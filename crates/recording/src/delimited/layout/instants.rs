@@ -11,6 +11,7 @@ use crate::columns::Meant;
 use crate::columns::Quantity;
 use crate::columns::Role;
 use crate::columns::Unit;
+use crate::columns::words;
 use crate::decode::{Bare, bare_of_text, instant_of_date, unit_of, units_that_fit};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::TimeUnit;
@@ -38,6 +39,19 @@ struct Stamp {
     date: Option<usize>,
 }
 
+impl Stamp {
+    fn of_split((seconds, at, nanos): (usize, usize, i64)) -> Stamp {
+        Stamp {
+            at,
+            clock: Clock::Split { nanos },
+            unit: None,
+            is_exact: true,
+            note: None,
+            date: Some(seconds),
+        }
+    }
+}
+
 /// Steps by which the two kinds of `SampleTimeFine` are told apart: of 10 Hz and more in 0.1 ms, of 200 Hz and less
 /// in us.
 const FINE_TICKS: f64 = 1e3;
@@ -56,8 +70,19 @@ impl Roles<'_> {
         if let Some(given) = given.filter(|given| !given.columns.is_empty()) {
             let column = given.columns.first().map_or("", String::as_str);
             let at = place(self.names, column).map_err(|why| format!("{COLUMNS} stamp: {why}"))?;
-            let stamp = self.stamp(at, given.unit)?;
-            return Ok(self.of_stamp(stamp));
+            let split = self.split_second().filter(|(seconds, parts, _)| {
+                given.unit.is_none() && [*seconds, *parts].contains(&at)
+            });
+            return Ok(match split {
+                Some(split) => self.of_stamp(Stamp::of_split(split)),
+                None => self.of_stamp(self.stamp(at, given.unit)?),
+            });
+        }
+        let is_asked = [Role::Stamp, Role::Counter, Role::Step]
+            .iter()
+            .any(|role| self.given_of(*role).is_some());
+        if let Some(split) = self.split_second().filter(|_| !is_asked) {
+            return Ok(self.of_stamp(Stamp::of_split(split)));
         }
         let each = self.names.iter().enumerate();
         let is_stamp =
@@ -105,6 +130,46 @@ impl Roles<'_> {
                 }
             }
         }
+    }
+
+    /// Columns of whole seconds and of the parts of a second, so many nanoseconds each: named alike but for the unit, as
+    /// ROS and `timeval` write a time.
+    fn split_second(&self) -> Option<(usize, usize, i64)> {
+        const SECONDS: &[&str] = &["s", "sec", "secs", "second", "seconds"];
+        const PARTS: &[(i64, &[&str])] = &[
+            (
+                1,
+                &[
+                    "ns",
+                    "nsec",
+                    "nsecs",
+                    "nanosec",
+                    "nanosecs",
+                    "nanosecond",
+                    "nanoseconds",
+                ],
+            ),
+            (1_000, &["us", "usec", "usecs", "microsec", "microseconds"]),
+        ];
+        let named: Vec<Vec<String>> = self.names.iter().map(|name| words(&name.text)).collect();
+        let whole = |at: usize| -> Option<Vec<i64>> {
+            let cells = self.rows.iter().filter_map(|row| row.get(at));
+            cells.map(|cell| cell.trim().parse().ok()).collect()
+        };
+        named.iter().enumerate().find_map(|(parts_at, name)| {
+            let (unit, stem) = name.split_last()?;
+            let (nanos, _) = PARTS.iter().find(|(_, all)| all.contains(&unit.as_str()))?;
+            let seconds_at = named.iter().position(|other| {
+                let split = other.split_last();
+                split.is_some_and(|(unit, of)| of == stem && SECONDS.contains(&unit.as_str()))
+            })?;
+            let (parts, seconds) = (whole(parts_at)?, whole(seconds_at)?);
+            let are_parts = parts
+                .iter()
+                .all(|part| (0..1_000_000_000 / nanos).contains(part));
+            (are_parts && seconds.len() == parts.len() && !parts.is_empty())
+                .then_some((seconds_at, parts_at, *nanos))
+        })
     }
 
     /// A column called `ms`, `us` or `ns` and no more, in a table that has no other time, whose numbers rise: what a
@@ -269,8 +334,22 @@ impl Roles<'_> {
         let each = self.names.iter().enumerate();
         let mut times = each
             .filter(|(_, name)| name.meant == Meant::Clock)
-            .filter_map(|(at, _)| self.daily(at));
+            .filter_map(|(at, _)| self.dates(at).or_else(|| self.daily(at)));
         times.next()
+    }
+
+    /// A column of dates by RFC 3339, where it is.
+    fn dates(&self, at: usize) -> Option<Stamp> {
+        let cells = self.texts(at);
+        let is_it = !cells.is_empty() && cells.iter().all(|cell| instant_of_date(cell).is_some());
+        is_it.then_some(Stamp {
+            at,
+            clock: Clock::Dates,
+            unit: None,
+            is_exact: false,
+            note: None,
+            date: None,
+        })
     }
 
     /// The cells of a column in the first rows, as they are.

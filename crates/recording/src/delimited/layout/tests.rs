@@ -170,3 +170,74 @@ fn rates_of_a_gcsv_are_known_by_its_first_line_alone() {
         "{notes}"
     );
 }
+
+#[test]
+fn whole_seconds_and_parts_of_a_second_are_one_stamp() {
+    let row = |n: i64, split: i64, unit: i64| {
+        let at = 1_743_379_190_000_000_000 + n * 20_000_000;
+        format!("{},{},0.1,0.2,0.3\n", at / split, at % split / unit)
+    };
+    let text = |head: &str, unit: i64| {
+        let rows = (0..120).map(|n| row(n, 1_000_000_000, unit));
+        format!("{head},gyro_x,gyro_y,gyro_z\n{}", rows.collect::<String>())
+    };
+    for (head, unit) in [
+        ("sec,nanosec", 1),
+        ("secs,nsecs", 1),
+        ("header.stamp.sec,header.stamp.nanosec", 1),
+        ("timestamp_s,timestamp_ns", 1),
+        ("tv_sec,tv_usec", 1000),
+    ] {
+        let (rows, _) = rows(&text(head, unit), None);
+        for (n, (_, stamp)) in rows.iter().enumerate() {
+            let expected = 1_743_379_190_000_000_000 + n as i64 * 20_000_000;
+            assert_eq!(*stamp, Some(expected), "{head}");
+        }
+        // Either column says it, and a unit that is given is believed.
+        let (_, part) = head.split_once(',').unwrap();
+        let given = format!("stamp={part}");
+        assert_eq!(
+            self::rows(&text(head, unit), Some(&given)).0[70].1,
+            rows[70].1
+        );
+    }
+    // A total in two units is two stamps, of which none is a part.
+    let total = |n: i64| format!("{},{},0.1,0.2,0.3\n", n, n * 1_000_000_000);
+    let twice: String = (1..120).map(total).collect();
+    let (rows, _) = rows(
+        &format!("time_s,time_ns,gyro_x,gyro_y,gyro_z\n{twice}"),
+        None,
+    );
+    assert_eq!(rows[70].1, Some(71_000_000_000));
+}
+
+#[test]
+fn a_date_and_a_time_in_one_column_are_a_stamp_by_their_name() {
+    for (head, cell, nanos) in [
+        (
+            "DateTime",
+            "03/30/2025 01:02:03.500",
+            1_743_296_523_500_000_000,
+        ),
+        (
+            "datetime",
+            "30.03.2025 01:02:03.500",
+            1_743_296_523_500_000_000,
+        ),
+        (
+            "Date and Time",
+            "2025-03-30T01:02:03.5Z",
+            1_743_296_523_500_000_000,
+        ),
+        (
+            "time",
+            "01:02:03:500",
+            86_400_000_000_000 + 3_723_500_000_000,
+        ),
+    ] {
+        let line = format!("{cell},0.1,0.2,0.3\n");
+        let text = format!("{head},gyro_x,gyro_y,gyro_z\n{}", line.repeat(30));
+        let (rows, _) = rows(&text, None);
+        assert_eq!(rows[5].1, Some(nanos), "{head} {cell}");
+    }
+}
