@@ -463,7 +463,7 @@ fn the_log_of_faults_holds_exactly_the_faults_it_declares() {
             let gyro = vector_at(payload, GYRO);
             if gyro.iter().any(|rate| !rate.is_finite()) {
                 count("not finite");
-            } else if gyro.iter().any(|rate| rate.abs() > 1e4) {
+            } else if gyro.iter().any(|rate| rate.abs() > 4e4) {
                 count("huge");
             } else if f64_at(payload, GYRO + 24) == -1.0 {
                 count("marked absent");

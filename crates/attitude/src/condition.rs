@@ -15,7 +15,7 @@
 //! # Policy
 //! | seen | done | verdict |
 //! |---|---|---|
-//! | NaN or infinity in the gyro; above 1e4 rad/s (1e3 rad) | dropped; the next sample carries `REJECTED_BEFORE` | `NotFinite`, `Huge` |
+//! | NaN or infinity in the gyro; above 4e4 rad/s (1e3 rad) | dropped; the next sample carries `REJECTED_BEFORE` | `NotFinite`, `Huge` |
 //! | NaN in the acceleration | the acceleration alone is dropped | `Accepted` |
 //! | same stamp, same data (also when sent again later) | dropped, nothing is lost | `Repeated` |
 //! | same stamp, other data | given a stamp inside the longer step after it, or else before it | `Restamped` |

@@ -12,7 +12,13 @@ pub(crate) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
 pub(crate) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
 pub(crate) const GYRO_AXES_CHANGE: &str = "gyro-axes-change";
 /// Codes of a sensor that is read in wrong axes, by a wrong factor or in a wrong unit: the data show the right one.
-const MISREAD: [&str; 4] = ["gyro-axes", "gyro-scale", "unit-degrees", "mag-axes"];
+const MISREAD: [&str; 5] = [
+    "gyro-axes",
+    "gyro-scale",
+    "unit-degrees",
+    "unit-unknown",
+    "mag-axes",
+];
 
 /// Severity of a finding.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]

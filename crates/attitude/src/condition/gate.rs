@@ -8,8 +8,9 @@ use super::truncation::undone;
 use crate::record::{Nanos, RawSample, SampleKind, Status, Verdict};
 use nalgebra::{Matrix3, Vector3};
 
-/// Largest rate that is believed, rad/s: 570,000 deg/s, a hundred times the widest range sold.
-pub(super) const HUGE_RATE: f64 = 1e4;
+/// Largest rate that is believed, rad/s: a hundred times the widest range sold, and so much that counts of 16 bits, whose
+/// factor nobody has stated, are held against gravity.
+pub(super) const HUGE_RATE: f64 = 4e4;
 /// Largest angle of one sample that is believed, rad.
 const HUGE_ANGLE: f64 = 1e3;
 /// Longest integration interval believed of a message, nanoseconds.

@@ -15,6 +15,8 @@ pub(super) const MAPS: usize = 48;
 /// Factors are powers of this, of these exponents without 0.
 const RATIO: f64 = 1.25;
 const EXPONENTS: std::ops::RangeInclusive<i32> = -41..=10;
+/// Factor that stands for no rotation at all: of the counts of a range of 250 deg/s it is still none.
+const NOTHING: f64 = 1e-6;
 /// Counts per deg/s, and ranges in deg/s, of common sensors: InvenSense and Bosch, then ST by its mdps per count.
 pub const CHIPS: [(f64, u32); 8] = [
     (16.4, 2000),
@@ -76,7 +78,7 @@ pub(super) struct Hypothesis {
     cost: f64,
 }
 
-/// The bank: maps, then factors; the smallest factor stands for no rotation at all.
+/// The bank: maps, then factors, of which the first stands for no rotation at all.
 pub(super) static BANK: LazyLock<Vec<Hypothesis>> = LazyLock::new(bank);
 
 fn bank() -> Vec<Hypothesis> {
@@ -111,7 +113,12 @@ fn bank() -> Vec<Hypothesis> {
         }
     }
     maps.sort_by(|some, other| some.cost.total_cmp(&other.cost));
-    let powers = EXPONENTS.filter(|k| *k != 0).map(|k| RATIO.powi(k));
+    let powers = EXPONENTS
+        .filter(|k| *k != 0)
+        .map(|k| match k == *EXPONENTS.start() {
+            true => NOTHING,
+            false => RATIO.powi(k),
+        });
     let chips = CHIPS.map(|(counts, _)| DEGREE / counts);
     maps.extend(powers.chain(UNITS).chain(chips).map(|factor| Hypothesis {
         map: Matrix3::from_diagonal_element(factor),

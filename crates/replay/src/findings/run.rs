@@ -53,7 +53,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         out.push(nothing_used(summary));
     }
     if noted.largest_rate > UNLIKELY_RATE {
-        out.push(samples::rates_like_degrees(noted.largest_rate));
+        out.push(samples::rates_of_another_unit(noted.largest_rate));
     }
     out.extend(steps(summary.undersampled, summary.largest_step).filter(is_no_opinion));
     let total = summary.counts.total();

@@ -15,7 +15,7 @@ use crate::summary::significant;
 use serde_json::json;
 use strapd_attitude::condition::quality::{AxisStats, Clipped};
 use strapd_attitude::record::Counts;
-use strapd_attitude::setting::{BIAS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG};
+use strapd_attitude::setting::{BIAS, GYRO_RANGE, GYRO_SCALE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG};
 
 /// A bias is worth removing when it is this many sigmas from nothing, and above this rate (deg/h).
 const BIAS_SIGMAS: f64 = 5.0;
@@ -141,7 +141,7 @@ fn degrees(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         .map(|a| a.max.abs().max(a.min.abs()))
         .fold(0.0, f64::max);
     if is_fast(seen.looked) {
-        out.push(rates_like_degrees(peak));
+        out.push(rates_of_another_unit(peak));
     }
 }
 
@@ -319,8 +319,21 @@ fn bias(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     }
 }
 
+/// Largest rate of a gyro with three axes, deg/s, with room: larger numbers are no deg/s either.
+const WIDEST_RANGE: f64 = 4600.0;
+
 /// Finding for rates that no gyro reaches in rad/s.
-pub(super) fn rates_like_degrees(peak: f64) -> Finding {
+pub(super) fn rates_of_another_unit(peak: f64) -> Finding {
+    if peak > WIDEST_RANGE {
+        return Finding::new(
+            Severity::Error,
+            "unit-unknown",
+            format!("rates reach {peak:.0}: no gyro measures that in rad/s or deg/s: raw counts, or another unit"),
+        )
+        .with("largest_rate", peak)
+        .advise("its data sheet says how many counts are one deg/s: rad/s are 0.01745 over that many")
+        .help([GYRO_SCALE.to("FACTOR")]);
+    }
     Finding::new(
         Severity::Error,
         "unit-degrees",

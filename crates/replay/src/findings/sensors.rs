@@ -15,7 +15,7 @@ use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 const AXES: &str = "gyro-axes";
 const SCALE: &str = "gyro-scale";
 /// Findings that have only a guess where a cause is named.
-const GUESSES: [&str; 2] = ["unit-against-gravity", "unit-degrees"];
+const GUESSES: [&str; 3] = ["unit-against-gravity", "unit-degrees", "unit-unknown"];
 /// Findings that rates in a wrong unit bring with them.
 const BY_UNIT: [&str; 2] = ["under-sampled", "large-turn-per-step"];
 /// Largest sigma of a factor that is more than an order of size.

@@ -40,7 +40,7 @@ fn of(verdict: Verdict, n: u64, total: u64) -> Option<Finding> {
         Verdict::Huge => Some(
             found(
                 (Error, "huge-rate"),
-                "samples have a rate that no gyro can have (above 10,000 rad/s, or a delta angle above 1000 rad)",
+                "samples have a rate that no gyro can have (above 40,000 rad/s, or a delta angle above 1000 rad)",
                 "they are left out: a damaged value, or raw counts or another unit",
             )?
             .help([GYRO_UNIT.to("deg|mrad")]),

@@ -176,6 +176,13 @@ fn rates_no_gyro_has_are_taken_for_degrees_but_a_spike_is_not() {
     let raw: Vec<RawSample> = (0..2000).map(|n| turning(n, 500.0)).collect();
     let degrees = |raw: &[RawSample]| codes(&of_samples(&looked(raw))).contains(&"unit-degrees");
     assert!(degrees(&raw));
+    // Counts are no deg/s either.
+    let raw: Vec<RawSample> = (0..2000).map(|n| turning(n, 30_000.0)).collect();
+    let found = codes(&of_samples(&looked(&raw)));
+    assert!(
+        !degrees(&raw) && found.contains(&"unit-unknown"),
+        "{found:?}"
+    );
     let mut raw: Vec<RawSample> = (0..2000).map(|n| turning(n, 5.0)).collect();
     raw[1000].gyro = Some([700.0, 0.0, 0.0]);
     raw[1001].gyro = Some([6e302, 0.0, 0.0]);

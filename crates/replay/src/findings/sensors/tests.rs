@@ -119,6 +119,11 @@ fn the_scale_of_the_gyro_is_named_and_what_is_advised_cures_it() {
             "counts of a range of 500 deg/s",
             GYRO_SCALE.to("0.0002665"),
         ),
+        (
+            131.0 * deg,
+            "counts of a range of 250 deg/s",
+            GYRO_SCALE.to("0.0001332"),
+        ),
     ] {
         let bad = by_gyro(&clean, &Matrix3::from_diagonal_element(factor));
         let all = found(&bad, &[]);
