@@ -205,8 +205,7 @@ pub fn read_from(
             ),
         )
         .of(Kind::UnknownClass)),
-        None if let Some(measured) = heading::bare(line) => Ok(Message::Heading(measured)),
-        None => Err(Fault::new(
+        None => heading::bare(line).map(Message::Heading).ok_or_else(|| Fault::new(
             "no_rate",
             "the line holds no body rate and no class; expected like {\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}",
         )),

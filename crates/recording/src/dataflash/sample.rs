@@ -4,7 +4,6 @@
 //! are forward, right, down.
 
 use super::layout::Layout;
-use crate::records::cdr::{put, stamped};
 use crate::records::imu::{self, flu};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 
@@ -41,7 +40,7 @@ impl Content {
         match self {
             Content::Imu => (1, imu::TYPE),
             Content::Field => (2, imu::FIELD_TYPE),
-            Content::Attitude => (3, "geometry_msgs/msg/QuaternionStamped"),
+            Content::Attitude => (3, imu::ATTITUDE_TYPE),
         }
     }
 
@@ -78,8 +77,7 @@ impl Content {
             }
             Content::Attitude => {
                 let angles = layout.vector(message, ["Roll", "Pitch", "Yaw"])?;
-                let numbers = stamped(out, (time, FRAME), 4);
-                put(out.get_mut(numbers..)?, 0, attitude(angles));
+                imu::attitude(out, (time, FRAME), attitude(angles));
             }
         }
         Some(())
@@ -90,8 +88,7 @@ impl Content {
 fn attitude(angles: [f64; 3]) -> [f64; 4] {
     let [roll, pitch, yaw] = angles.map(f64::to_radians);
     let q = Quaternion::<(), ()>::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
-    let [w, x, y, z] = q.wxyz();
-    [x, -y, -z, w]
+    imu::nwu_of_ned(&q)
 }
 
 #[cfg(test)]

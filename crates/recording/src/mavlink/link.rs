@@ -4,7 +4,7 @@
 //! or cannot be known and stands before something else, costs a byte, and the search goes on behind that.
 
 use super::frame::{Checked, Frame, begins, frame};
-use super::message;
+use super::message::{self, Content};
 use super::sequence::{Sequences, topic};
 use crate::records::imu;
 
@@ -72,7 +72,10 @@ impl Link {
         if let Some(prefix) = prefix {
             id = format!("{prefix}/{id}");
         }
-        let (rate, force) = (sample.rate, sample.force);
+        // An attitude is none of strapd's own.
+        let Content::Imu { rate, force } = sample.content else {
+            return;
+        };
         if rate.iter().chain(&force).any(|value| !value.is_finite()) {
             return;
         }

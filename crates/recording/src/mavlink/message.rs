@@ -4,7 +4,8 @@
 //! units.
 
 use crate::records::Bytes;
-use crate::records::imu::flu;
+use crate::records::imu::{flu, nwu_of_ned};
+use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 
 /// Standard gravity, m/s^2, of which forces are thousandths.
 const MILLI_G: f64 = 9.806_65e-3;
@@ -26,6 +27,10 @@ enum Form {
     Raw,
     /// us, then SI.
     HighRes,
+    /// ms, then roll, pitch and yaw, rad.
+    Angles,
+    /// ms, then a rotation.
+    Rotation,
     /// Looked at for its checksum alone.
     Other,
 }
@@ -37,17 +42,25 @@ pub(super) struct Sample {
     pub(super) time: u64,
     /// Index of the sensor, where the message states it.
     pub(super) sensor: u8,
-    /// rad/s; x forward, y left, z up.
-    pub(super) rate: [f64; 3],
-    /// m/s^2.
-    pub(super) force: [f64; 3],
+    pub(super) content: Content,
+}
+
+/// Content of a sample.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Content {
+    /// rad/s and m/s^2; x forward, y left, z up.
+    Imu { rate: [f64; 3], force: [f64; 3] },
+    /// What the vehicle takes its attitude for, x, y, z, w: such a body to a world with x north, y west, z up.
+    Attitude([f64; 4]),
 }
 
 /// Number, name, and so on.
-const KNOWN: [(u32, MessageSpec); 6] = [
+const KNOWN: [(u32, MessageSpec); 8] = [
     (0, known("HEARTBEAT", 50, Form::Other)),
     (26, known("SCALED_IMU", 170, Form::Scaled)),
     (27, known("RAW_IMU", 144, Form::Raw)),
+    (30, known("ATTITUDE", 39, Form::Angles)),
+    (31, known("ATTITUDE_QUATERNION", 246, Form::Rotation)),
     (105, known("HIGHRES_IMU", 93, Form::HighRes)),
     (116, known("SCALED_IMU2", 76, Form::Scaled)),
     (129, known("SCALED_IMU3", 46, Form::Scaled)),
@@ -82,34 +95,54 @@ impl MessageSpec {
             .get_mut(..length)?
             .copy_from_slice(payload.get(..length)?);
         let mut bytes = Bytes::new(&whole);
-        let mut sample = Sample {
-            time: 0,
-            sensor: 0,
-            rate: [0.0; 3],
-            force: [0.0; 3],
-        };
-        match self.form {
+        let time = match self.form {
             Form::Other => return None,
-            Form::Scaled => sample.time = u64::from(bytes.u32()?) * 1_000_000,
-            Form::Raw | Form::HighRes => sample.time = bytes.u64()?.saturating_mul(1000),
-        }
-        if self.form == Form::HighRes {
-            let mut number = || Some(f64::from(f32::from_bits(bytes.u32()?)));
-            let mut vector = || Some([number()?, number()?, number()?]);
-            (sample.force, sample.rate) = (vector()?, vector()?);
-            // Behind three of the field, three pressures, a temperature, and which of them are new.
-            sample.sensor = *whole.get(62)?;
-        } else {
-            let mut number = || Some(f64::from(bytes.u16()?.cast_signed()));
-            let mut vector =
-                |unit: f64| Some([number()? * unit, number()? * unit, number()? * unit]);
-            (sample.force, sample.rate) = (vector(MILLI_G)?, vector(1e-3)?);
-            if self.form == Form::Raw {
-                sample.sensor = *whole.get(26)?;
+            Form::Scaled | Form::Angles | Form::Rotation => u64::from(bytes.u32()?) * 1_000_000,
+            Form::Raw | Form::HighRes => bytes.u64()?.saturating_mul(1000),
+        };
+        let mut float = || Some(f64::from(f32::from_bits(bytes.u32()?)));
+        let (force, rate) = match self.form {
+            Form::Angles => {
+                let (roll, pitch, yaw) = (float()?, float()?, float()?);
+                let q = Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
+                return Some(attitude(time, q));
             }
-        }
+            Form::Rotation => {
+                let q = [float()?, float()?, float()?, float()?];
+                return Some(attitude(time, Quaternion::assume_unit(q)));
+            }
+            Form::HighRes => {
+                let mut vector = || Some([float()?, float()?, float()?]);
+                (vector()?, vector()?)
+            }
+            _ => {
+                let mut number = || Some(f64::from(bytes.u16()?.cast_signed()));
+                let mut vector =
+                    |unit: f64| Some([number()? * unit, number()? * unit, number()? * unit]);
+                (vector(MILLI_G)?, vector(1e-3)?)
+            }
+        };
+        let sensor = match self.form {
+            // Behind three of the field, three pressures, a temperature, and which of them are new.
+            Form::HighRes => *whole.get(62)?,
+            Form::Raw => *whole.get(26)?,
+            _ => 0,
+        };
         // The protocol's axes are forward, right, down.
-        (sample.rate, sample.force) = (flu(sample.rate), flu(sample.force));
-        Some(sample)
+        let (rate, force) = (flu(rate), flu(force));
+        Some(Sample {
+            time,
+            sensor,
+            content: Content::Imu { rate, force },
+        })
+    }
+}
+
+/// The sample of an attitude.
+fn attitude(time: u64, of_aviation: Quaternion<(), ()>) -> Sample {
+    Sample {
+        time,
+        sensor: 0,
+        content: Content::Attitude(nwu_of_ned(&of_aviation)),
     }
 }

@@ -4,14 +4,14 @@
 //! that cannot be known, if another follows it.
 
 use super::frame::{Checked, Frame, LONGEST, STAMP, begins, frame};
-use super::message;
+use super::message::{self, Content};
 use super::sequence::{Sequences, topic};
 use crate::decode::known_definition;
 use crate::records::imu;
 use crate::records::problem::{ProblemKind, Problems};
 use crate::records::transcript::{ReadProgress, Transcribe, Transcript};
 use crate::records::walk::Walk;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Bytes looked at to believe a frame, and to find one.
 const WINDOW: usize = 3 * LONGEST;
@@ -29,6 +29,7 @@ pub(crate) struct Transcriber {
     is_bare: bool,
     sequences: Sequences,
     channels: BTreeMap<Sender, (u16, u32)>,
+    schemas: BTreeSet<u16>,
     /// The first that sent a sample: its topics have plain names.
     first: Option<(u8, u8)>,
     message: Vec<u8>,
@@ -122,13 +123,17 @@ impl Transcriber {
                 let Some(number) = u16::try_from(next).ok().filter(|n| *n < u16::MAX) else {
                     return self.walk.fault(ProblemKind::TooManyDefinitions, None);
                 };
-                if number == 0 {
-                    let text = known_definition(imu::TYPE).unwrap_or_default();
-                    to.schema(1, imu::TYPE, "ros2msg", text.as_bytes());
+                let (schema, of) = match sample.content {
+                    Content::Imu { .. } => (1, imu::TYPE),
+                    Content::Attitude(_) => (2, imu::ATTITUDE_TYPE),
+                };
+                if self.schemas.insert(schema) {
+                    let text = known_definition(of).unwrap_or_default();
+                    to.schema(schema, of, "ros2msg", text.as_bytes());
                 }
                 let topic = topic(known.name, sample.sensor, own, first);
                 let said = known.assumed().map(|unit| ("unit", unit));
-                to.channel(number, 1, &topic, "cdr", said.as_slice());
+                to.channel(number, schema, &topic, "cdr", said.as_slice());
                 self.channels.entry(sender).or_insert((number, 0))
             }
         };
@@ -138,7 +143,12 @@ impl Transcriber {
             false => found.time.saturating_mul(1000),
         };
         let stamp = (sample.time, "vehicle");
-        imu::imu(&mut self.message, stamp, sample.rate, Some(sample.force));
+        match sample.content {
+            Content::Imu { rate, force } => {
+                imu::imu(&mut self.message, stamp, rate, Some(force));
+            }
+            Content::Attitude(q) => imu::attitude(&mut self.message, stamp, q),
+        }
         to.message(*channel, *count, time, &self.message);
         *count = count.wrapping_add(1);
     }

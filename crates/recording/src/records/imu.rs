@@ -6,6 +6,7 @@
 
 use super::cdr::{Cdr, put, stamped};
 use std::fmt::Write;
+use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::SampleKind;
 
 /// The type.
@@ -62,6 +63,22 @@ pub(crate) const FIELD_TYPE: &str = "sensor_msgs/msg/MagneticField";
 pub(crate) fn field(out: &mut Vec<u8>, header: (u64, &str), field: [f64; 3]) {
     let place = stamped(out, header, 3 + 9);
     put(out.get_mut(place..).unwrap_or_default(), 0, field);
+}
+
+/// Type of an attitude alone.
+pub(crate) const ATTITUDE_TYPE: &str = "geometry_msgs/msg/QuaternionStamped";
+
+/// Writes an attitude, x, y, z, w, in place of what is in `out`.
+pub(crate) fn attitude(out: &mut Vec<u8>, header: (u64, &str), q: [f64; 4]) {
+    let place = stamped(out, header, 4);
+    put(out.get_mut(place..).unwrap_or_default(), 0, q);
+}
+
+/// A body with x forward, y right, z down to a world with x north, y east, z down, as one with y left and z up to a world
+/// with y west and z up, x, y, z, w.
+pub(crate) fn nwu_of_ned(q: &Quaternion<(), ()>) -> [f64; 4] {
+    let [w, x, y, z] = q.wxyz();
+    [x, -y, -z, w]
 }
 
 /// Forward, right, down as forward, left, up.

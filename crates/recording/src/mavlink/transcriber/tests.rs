@@ -301,3 +301,43 @@ fn a_capture_is_known_in_a_file_and_in_a_stream() {
     let stream = Reader::from_stream("link", Box::new(std::io::Cursor::new(log))).unwrap();
     assert_eq!([file.format(), stream.format()], [Format::Mavlink; 2]);
 }
+
+#[test]
+fn attitudes_of_a_vehicle_are_orientations_however_they_are_said() {
+    let floats = |values: &[f32]| -> Vec<u8> {
+        values
+            .iter()
+            .flat_map(|value| value.to_le_bytes())
+            .collect()
+    };
+    // Yaw 0.3, pitch 0.2, roll 0.1, north, east, down.
+    let angles = [
+        &7_u32.to_le_bytes()[..],
+        &floats(&[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]),
+    ]
+    .concat();
+    let q = [0.983_347_4, 0.034_270_8, 0.106_020_5, 0.143_572_2];
+    let turn = [&8_u32.to_le_bytes()[..], &floats(&q), &floats(&[0.0; 3])].concat();
+    let log = [
+        scaled(1),
+        framed(START + 2, 2, 30, 39, &angles),
+        framed(START + 3, 2, 31, 246, &turn),
+    ]
+    .concat();
+    for piece in [1, 50, log.len()] {
+        let (messages, faults) = read(&log, piece);
+        assert!(faults.is_empty(), "{faults:?}");
+        assert_eq!(messages.len(), 3);
+        for message in &messages[1..] {
+            let number = |at: usize| {
+                let bytes = &message[message.len() - 32 + 8 * at..];
+                f64::from_le_bytes(*bytes.first_chunk().unwrap())
+            };
+            // To the right about down is to the right about up reversed; nose up is about left reversed.
+            let [w, x, y, z] = q.map(f64::from);
+            for (at, expected) in [x, -y, -z, w].into_iter().enumerate() {
+                assert!((number(at) - expected).abs() < 1e-6, "{at}: {}", number(at));
+            }
+        }
+    }
+}
