@@ -70,6 +70,7 @@ pub use clock::{
 pub use histogram::Histogram;
 pub use memory::Memory;
 pub use mixture::{Apart, Mixture};
+pub use rails::{Clipped, Rails};
 pub use repairs::{SpikePolicy, StampRepair};
 pub use report::{ClockSet, FirstBad, GAPS_KEPT, Gap, Gaps, Report, Wraps};
 pub(crate) use settings::{LONGEST_SECS, MAX_GAP_SECS, SAMPLE_RATES};

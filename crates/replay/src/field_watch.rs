@@ -5,6 +5,7 @@
 
 use crate::summary::aid::Frozen;
 use nalgebra::Vector3;
+use strapd_attitude::condition::Rails;
 use strapd_attitude::record::{Nanos, SampleKind};
 
 /// A field that is the same to the bit is frozen once the body has rotated it by so much, rad...
@@ -15,6 +16,8 @@ const WINDOW: i64 = 5_000_000_000;
 const REPEATED: i64 = 2_000_000_000;
 /// A field that has been the same for less is one that changes: no rotation is followed, ns.
 const FOLLOWED: i64 = 250_000_000;
+/// Fields at one reading, as large as any, below which it is no end of a range.
+const LEAST_AT_END: u64 = 20;
 /// Across a longer step between rates, ns, nothing is known of the rotation.
 const STEP: i64 = 500_000_000;
 
@@ -36,6 +39,18 @@ pub(crate) struct FieldWatch {
     last: Option<Nanos>,
     is_frozen: bool,
     frozen: Option<Frozen>,
+    rails: Rails,
+}
+
+/// Axis of a magnetometer at the end of its range.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Saturated {
+    pub(crate) axis: usize,
+    /// Reading, in the unit of the source.
+    pub(crate) level: f64,
+    /// Different fields with it, and all.
+    pub(crate) samples: u64,
+    pub(crate) of: u64,
 }
 
 impl FieldWatch {
@@ -53,6 +68,7 @@ impl FieldWatch {
             last: None,
             is_frozen: false,
             frozen: None,
+            rails: Rails::new(),
         }
     }
 
@@ -69,6 +85,7 @@ impl FieldWatch {
         }
         self.thaw(stamp);
         self.changes += 1;
+        self.rails.push(&field.into());
         self.field = Some(field);
         (self.since, self.anchor) = (stamp, stamp);
     }
@@ -137,6 +154,21 @@ impl FieldWatch {
         let mut now = self.clone();
         now.finish();
         now.frozen
+    }
+
+    /// The axis that reads the end of its range the most.
+    pub(crate) fn saturated(&self) -> Option<Saturated> {
+        let clipped = self.rails.clipped_anywhere();
+        let found = clipped.iter().enumerate().filter_map(|(axis, clipped)| {
+            let clipped = clipped.filter(|clipped| clipped.samples >= LEAST_AT_END)?;
+            Some(Saturated {
+                axis,
+                level: clipped.level,
+                samples: clipped.samples,
+                of: self.changes,
+            })
+        });
+        found.max_by_key(|found| found.samples)
     }
 
     /// Number of fields, if none of them is more than zero.

@@ -78,7 +78,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 17] = [
+const FAULTS: [Fault; 18] = [
     ("good", |_, _| {}, "", ""),
     (
         "reversed",
@@ -158,6 +158,12 @@ const FAULTS: [Fault; 17] = [
         "field hangs",
         |_, s| s.mag = [0.5, 20.5, -44.5],
         "field-frozen",
+        "",
+    ),
+    (
+        "field at its end",
+        |_, s| s.mag = s.mag.map(|v| v.clamp(-25.0, 25.0)),
+        "field-saturated",
         "",
     ),
     ("no field", |_, s| s.mag = [0.0; 3], "field-empty", ""),

@@ -46,14 +46,22 @@ pub(super) struct Axis {
     quantum: f64,
 }
 
-/// Readings of three axes, in the unit of the source.
+/// Readings of three axes of a gyro, or of a magnetometer, in the unit of the source.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rails {
+pub struct Rails {
     axes: [Axis; 3],
 }
 
+impl Default for Rails {
+    fn default() -> Rails {
+        Rails::new()
+    }
+}
+
 impl Rails {
-    pub(crate) fn new() -> Rails {
+    /// No readings yet.
+    #[must_use]
+    pub fn new() -> Rails {
         let side = |sign| Side {
             sign,
             peak: f64::NEG_INFINITY,
@@ -72,8 +80,8 @@ impl Rails {
         }
     }
 
-    /// Takes the next rates; those that are not finite are passed over.
-    pub(crate) fn push(&mut self, gyro: &[f64; 3]) {
+    /// Takes the next readings; those that are not finite are passed over.
+    pub fn push(&mut self, gyro: &[f64; 3]) {
         if gyro.iter().any(|rate| !rate.is_finite()) {
             return;
         }
@@ -86,6 +94,12 @@ impl Rails {
         for ((axis, rate), other) in self.axes.iter_mut().zip(gyro).zip(others) {
             axis.push(*rate, other);
         }
+    }
+
+    /// Axes that were clipped at any level, of a sensor whose unit is nobody's matter.
+    #[must_use]
+    pub fn clipped_anywhere(&self) -> [Option<Clipped>; 3] {
+        self.clipped(0.0)
     }
 
     /// Ends of the range of each axis, where `rad` in the source's unit is one rad/s.

@@ -16,7 +16,7 @@ use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 13] = [
+const LASTING: [&str; 14] = [
     "gyro-axes",
     "gyro-scale",
     "gyro-against-gravity",
@@ -25,6 +25,7 @@ const LASTING: [&str; 13] = [
     "saturated",
     "stuck",
     "field-frozen",
+    "field-saturated",
     "field-empty",
     MIXED,
     GYRO_UNIT_CHANGE,
@@ -221,6 +222,7 @@ impl SensorWatch {
         now.extend(self.speed.as_mut().and_then(SpeedWatch::finding));
         let frozen = self.field.frozen_so_far();
         now.extend(frozen.map(|frozen| run::field_frozen(estimator.conditioning(), frozen)));
+        now.extend(self.field.saturated().map(run::field_saturated));
         let empty = self.field.empty().filter(|n| *n >= FIELDS);
         now.extend(empty.map(field_empty));
         let gyro = estimator.consistency();

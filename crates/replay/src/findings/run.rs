@@ -1,6 +1,7 @@
 //! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
 use super::{Finding, Severity, cures, magnetometer, orientation, samples, sensors, stream};
+use crate::field_watch::Saturated;
 use crate::summary::aid::Frozen;
 use crate::summary::clocks::{clock_was_set, counter_wraps};
 use crate::summary::{Gaps, TopicSummary, significant};
@@ -36,6 +37,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) stamps_carried: u64,
     /// Time for which the magnetic field stood still while the body rotated.
     pub(crate) frozen_field: Option<Frozen>,
+    /// Axis of the magnetometer at the end of its range.
+    pub(crate) saturated_field: Option<Saturated>,
     /// Frames of other bodies on the topic, and how many messages named them.
     pub(crate) left_out: &'a [(String, u64)],
     /// Gyro held against accelerometer, with what the samples were taken for.
@@ -79,6 +82,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             .frozen_field
             .map(|frozen| field_frozen(noted.conditioning, frozen)),
     );
+    out.extend(noted.saturated_field.map(field_saturated));
     out.extend(samples::zero_rows(noted.zeros, total));
     if noted.stamps_carried > 0 {
         let n = noted.stamps_carried;
@@ -279,6 +283,25 @@ pub(super) fn field_frozen(report: &Report, frozen: Frozen) -> Finding {
     .with("secs", frozen.secs)
     .with("first_at_s", at)
     .advise("the heading is the gyro's there: the magnetometer or its driver hung")
+}
+
+/// A magnetometer at the end of its range.
+pub(super) fn field_saturated(found: Saturated) -> Finding {
+    let axis = ["x", "y", "z"].get(found.axis).copied().unwrap_or("");
+    Finding::new(
+        Severity::Warning,
+        "field-saturated",
+        format!(
+            "the magnetometer reads {} along {axis} in {} of {} fields, and never more: it is at the end of its range",
+            significant(found.level, 4),
+            found.samples,
+            found.of
+        ),
+    )
+    .with("axis", axis)
+    .with("level", found.level)
+    .with("fields", found.samples)
+    .advise("the heading is wrong there: a wider range, or no magnet and no steel so near")
 }
 
 /// Stamps that several samples share.

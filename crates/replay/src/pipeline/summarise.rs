@@ -93,6 +93,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             stamps_carried: topic.noticed.stamps_carried.load(Ordering::Relaxed),
             left_out: &topic.noticed.left_out(),
             frozen_field: topic.field.as_ref().and_then(FieldWatch::frozen),
+            saturated_field: topic.field.as_ref().and_then(FieldWatch::saturated),
             gyro: topic
                 .estimator
                 .consistency()
