@@ -137,13 +137,13 @@ impl OutsideHeadings {
         (self.has_begun, self.contradicted, self.last) = (false, 0.0, None);
     }
 
-    /// No sample follows.
+    /// Ends it: no sample follows.
     pub(super) fn finish(&mut self) {
         self.counts.unpaired += self.waiting.len() as u64;
         self.waiting.clear();
     }
 
-    /// What the measurements up to this sample ask for: corrections, or one turn and no more.
+    /// Appends what the measurements up to this sample ask for: corrections, or one turn and no more.
     pub(super) fn at(&mut self, now: &Now, asked: &mut Vec<Use>) {
         while let Some((stamp, measured)) = self.waiting.front().copied() {
             let stamp = stamp.unwrap_or(now.stamp);

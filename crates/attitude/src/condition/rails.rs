@@ -59,7 +59,7 @@ impl Default for Rails {
 }
 
 impl Rails {
-    /// No readings yet.
+    /// Rails without readings.
     #[must_use]
     pub fn new() -> Rails {
         let side = |sign| Side {

@@ -3,6 +3,8 @@
 //! Conditions and propagates; what must be known first ([`Prepared`]) is given. Reads no clock and
 //! does no I/O.
 
+mod headings;
+
 use super::aiding::{self, Forces};
 use super::anew::RestartRequest;
 use super::gyro_watch::GyroWatch;
@@ -21,12 +23,12 @@ use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
 use super::smoothing_priors::looseness;
-use crate::aid::{self, AidedPropagator, OtherClass, OutsideHeading, OutsideHeadingCounts};
+use crate::aid::{self, AidedPropagator, OtherClass};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
 use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
-use crate::propagate::{self, Executor, Method, Propagator, Sequential};
+use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use crate::smooth::PriorSigmas;
 
@@ -345,50 +347,6 @@ impl Estimator {
         self.keep_doubted();
         self.integrator.begin_anew(anew);
         self.begins_anew = true;
-    }
-
-    /// Turns the world so that the next sample has this heading (rad), and says [`Status::RESET`]: see
-    /// [`AidedPropagator::turn_heading`]. `false`, and nothing changes, of a gyro alone: it has no vertical.
-    ///
-    /// [`Status::RESET`]: crate::record::Status::RESET
-    /// [`AidedPropagator::turn_heading`]: crate::aid::AidedPropagator::turn_heading
-    pub fn turn_heading(&mut self, heading: f64) -> bool {
-        self.note(|| Event::Heading(heading));
-        self.retaking.note_heading(heading);
-        self.integrator.turn_heading(heading)
-    }
-
-    /// Takes a heading that something else than the sensor has measured: a course of GNSS, a compass, another tracker, as
-    /// the yaw of the attitudes in their own world; see [`AidedPropagator::take_heading`]. `stamp` is on the clock of the
-    /// samples. `false`, and nothing changes, where nothing can use it: a gyro alone has no vertical to turn about, and a
-    /// smoother takes none.
-    ///
-    /// [`AidedPropagator::take_heading`]: crate::aid::AidedPropagator::take_heading
-    pub fn take_heading(&mut self, stamp: Option<Nanos>, measured: OutsideHeading) -> bool {
-        if !self.integrator.takes_headings() {
-            return false;
-        }
-        self.note(|| Event::OutsideHeading(stamp, measured));
-        let own = OutsideHeading {
-            heading: self.asked.own_heading(measured.heading),
-            ..measured
-        };
-        let is_stamped = stamp.is_some();
-        let stamp = stamp.map_or(Nanos(0), |stamp| self.conditioner.of_auxiliary(stamp));
-        let heading = Auxiliary::Heading {
-            is_stamped,
-            measured: own,
-        };
-        self.beside.push((self.rates.len(), stamp, heading));
-        // However many come before the next sample, they are bounded where they wait.
-        self.make(&Sequential);
-        true
-    }
-
-    /// Counts of such headings.
-    #[must_use]
-    pub fn outside_headings(&self) -> OutsideHeadingCounts {
-        self.integrator.outside_headings()
     }
 
     /// See [`Conditioner::stamp_of`].

@@ -50,7 +50,7 @@ pub(super) struct Sample {
 pub(super) enum Content {
     /// rad/s and m/s^2; x forward, y left, z up.
     Imu { rate: [f64; 3], force: [f64; 3] },
-    /// What the vehicle takes its attitude for, x, y, z, w: such a body to a world with x north, y west, z up.
+    /// Attitude of the vehicle by its own estimate, x, y, z, w: such a body to a world with x north, y west, z up.
     Attitude([f64; 4]),
 }
 

@@ -51,7 +51,7 @@ fn wrapped(angle: f64) -> f64 {
         .2
 }
 
-/// How a heading is measured: error (rad) of the measurement at a time, and how late it comes, s.
+/// Error (rad) of a measurement made at a time (s); `None` where none is made.
 type Source<'a> = &'a dyn Fn(f64) -> Option<f64>;
 
 struct Driven {
