@@ -29,6 +29,7 @@ pub mod report;
 pub mod send;
 mod serial;
 pub mod serve;
+mod service_manager;
 pub mod serving;
 pub mod setting_args;
 pub mod shell;

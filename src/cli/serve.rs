@@ -6,7 +6,7 @@ use super::config::Layered;
 use super::estimation::Estimation;
 use super::invitation::{self, Invitation};
 use super::tables::Tables;
-use super::{Global, Outcome, serial};
+use super::{Global, Outcome, serial, service_manager};
 use crate::address::Address;
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
@@ -252,9 +252,7 @@ async fn serve(
     let hub = server.hub().clone();
     tracing::info!(session = hub.session(), "ready {}", addresses.join(" "));
     invitation::show(server.addresses(), inviting.as_ref());
-    // Nobody may have started us that wants to know.
-    let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
-    tokio::spawn(pat_the_watchdog());
+    service_manager::ready();
     let keeping = state
         .clone()
         .map(|file| tokio::spawn(hub.clone().keep_saving(file)));
@@ -266,7 +264,7 @@ async fn serve(
         .run(async {
             let signal = signals.first(|| reopen(&hub)).await;
             tracing::info!("{}: shutting down", signal.name());
-            let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
+            service_manager::stopping();
         })
         .await;
     if !drained {
@@ -300,18 +298,6 @@ async fn serve(
         of(&hub.counters.faults)
     );
     Ok(Outcome::Done)
-}
-
-/// Tells a service manager that asks for it that the runtime still turns.
-async fn pat_the_watchdog() {
-    let Some(limit) = sd_notify::watchdog_enabled().filter(|limit| !limit.is_zero()) else {
-        return;
-    };
-    let mut tick = tokio::time::interval((limit / 2).max(Duration::from_millis(1)));
-    loop {
-        tick.tick().await;
-        let _ = sd_notify::notify(&[sd_notify::NotifyState::Watchdog]);
-    }
 }
 
 /// A hang-up: the wish to go on in a new file, as of a log rotation. In a terminal it means that the

@@ -11,7 +11,9 @@ use super::core::hub::{self, Hub};
 use super::core::outgoing::Outgoing;
 use super::core::read_buffer::now;
 use super::core::reading::{LineParameters, Reading};
-use super::edge::listen::{self, Listener};
+use super::edge::listen::Listener;
+#[cfg(unix)]
+use super::edge::listen::Passed;
 use super::edge::output::Output;
 use super::edge::source::Endpoint;
 use super::edge::{connect, forward};
@@ -90,7 +92,7 @@ pub struct Settings {
     pub web: Web,
     /// Sockets a service manager has opened.
     #[cfg(unix)]
-    pub passed: listen::Passed,
+    pub passed: Passed,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).

@@ -22,7 +22,9 @@ use crate::serve::core::hub::{Hub, count};
 use crate::serve::guard::limits::Backoff;
 use crate::serve::guard::places::{Kind, Place};
 use crate::serve::protocol::wire;
-use crate::sink::address::{Listen, Transport};
+use crate::sink::address::Listen;
+#[cfg(unix)]
+use crate::sink::address::Transport;
 use bytes::Bytes;
 use std::future::Future;
 use std::io;

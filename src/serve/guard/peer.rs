@@ -18,6 +18,7 @@ pub enum Origin {
     /// An address.
     Address(IpAddr),
     /// A user of this machine, by id: over a Unix socket.
+    #[cfg_attr(not(unix), expect(dead_code, reason = "no such sockets"))]
     User(u32),
     /// Whoever started the daemon chose it: a source, standard input.
     Own,
@@ -43,6 +44,7 @@ impl Peer {
     }
 
     /// A user of this machine.
+    #[cfg(unix)]
     #[must_use]
     pub fn user(name: String, id: u32) -> Peer {
         Peer {
