@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
 use std::time::Duration;
+use strapd_attitude::quaternion::Quaternion;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Reader;
 
@@ -55,7 +56,36 @@ fn the_samples_of_a_vehicle_are_those_pymavlink_reads() {
     let data = &ours.iter().find(|m| m.0 == "SCALED_IMU2").unwrap().3;
     let stamp = [4, 8].map(|at| u32::from_le_bytes(*data[at..].first_chunk().unwrap()));
     assert_eq!(stamp, [76_673, 745_000_000]);
-    assert_eq!(ours.len(), 18);
+    // Roll, pitch and yaw of the first and the last attitude, rad, north, east, down.
+    let attitudes: Vec<_> = ours.iter().filter(|m| m.0 == "ATTITUDE").collect();
+    assert_eq!((attitudes.len(), ours.len()), (9, 27));
+    for (message, [roll, pitch, yaw]) in [
+        (
+            attitudes[0],
+            [
+                -1.538_471_937_179_565_4,
+                0.015_643_049_031_496_048,
+                1.178_480_982_780_456_5,
+            ],
+        ),
+        (
+            attitudes[8],
+            [
+                -1.538_198_471_069_336,
+                0.014_899_618_923_664_093,
+                1.191_441_059_112_548_8,
+            ],
+        ),
+    ] {
+        let data = &message.3[message.3.len() - 32..];
+        let [x, y, z, w] =
+            [0, 8, 16, 24].map(|at| f64::from_le_bytes(*data[at..].first_chunk().unwrap()));
+        // Forward, left, up in a world whose x is north and whose y is west: y and z have other signs.
+        let own = Quaternion::<(), ()>::assume_unit([w, x, -y, -z]).yaw_pitch_roll();
+        for (found, said) in [(own.roll, roll), (own.pitch, pitch), (own.yaw, yaw)] {
+            assert!((found - said).abs() < 1e-12, "{own:?}");
+        }
+    }
 }
 
 #[test]
