@@ -9,6 +9,7 @@ use crate::samples::{Rows, Samples, Times, sample};
 use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use strapd_attitude::aid::OutsideHeading;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{EstimationSettings, Estimator, Meaning, Prepared, at_once};
 use strapd_attitude::propagate::Sequential;
@@ -17,6 +18,9 @@ use strapd_replay::pipeline::samples::so_far;
 
 /// Samples between two looks for Ctrl-C.
 const BLOCK: usize = 4096;
+
+/// Refusal of a heading that nothing can use.
+const NO_VERTICAL: &str = "heading: a number is expected, of a sensor whose vertical is known (a specific force, and aid other than \"none\")";
 
 /// An attitude as it is told at once: `(t, (w, x, y, z))`.
 type AttitudeTuple = (i64, (f64, f64, f64, f64));
@@ -47,6 +51,15 @@ impl Live {
         match &mut self.running {
             Some((estimator, _)) => Ok(estimator),
             None => Err("no estimator".into()),
+        }
+    }
+
+    /// The estimator, once a sample has come.
+    fn begun(&mut self, py: Python<'_>) -> PyResult<&mut Estimator> {
+        self.check_open(py)?;
+        match &mut self.running {
+            Some((estimator, _)) => Ok(estimator),
+            None => Err(argument("heading: no sample has come yet, whose it could be")),
         }
     }
 
@@ -224,6 +237,53 @@ impl Live {
             columns.extend(&rest);
         }
         columns.into_dict(py)
+    }
+
+    /// Sets the heading of the next sample, degrees; tilt and what was learned stay.
+    fn set_heading(&mut self, py: Python<'_>, heading: f64) -> PyResult<()> {
+        let estimator = self.begun(py)?;
+        if estimator.filter().is_some_and(|filter| filter.has_field()) {
+            return Err(argument("heading: the magnetic field tells it"));
+        }
+        if !heading.is_finite() || !estimator.set_heading(heading.to_radians()) {
+            return Err(argument(NO_VERTICAL));
+        }
+        Ok(())
+    }
+
+    /// Takes a heading that something else has measured, degrees.
+    #[pyo3(signature = (heading, sigma, t=None))]
+    fn measure_heading(
+        &mut self,
+        py: Python<'_>,
+        heading: f64,
+        sigma: f64,
+        t: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let stamp = t.map(nanos).transpose()?;
+        let estimator = self.begun(py)?;
+        let measured = OutsideHeading {
+            heading: heading.to_radians(),
+            sigma: sigma.to_radians(),
+        };
+        if !measured.is_plausible() {
+            return Err(argument(
+                "heading, sigma: degrees are expected, ten turns at most, and a sigma above 0 and 360 at most",
+            ));
+        }
+        if !estimator.take_heading(stamp, measured) {
+            return Err(argument(NO_VERTICAL));
+        }
+        Ok(())
+    }
+
+    /// Counts of measured headings: used, doubted, unpaired, turns.
+    fn heading_counts(&self) -> [u64; 4] {
+        let counts = match &self.running {
+            Some((estimator, _)) => estimator.outside_headings(),
+            None => Default::default(),
+        };
+        [counts.used, counts.doubted, counts.unpaired, counts.turns]
     }
 
     /// Number of samples that came.

@@ -114,3 +114,42 @@ def test_what_is_known_live_has_the_names_of_a_replay(command: str, tmp_path: pa
         assert keys(summary) == keys(said)
     assert live["written"] == 300 and live["aid"]["learned"]["mag_hard_iron"] is None
     assert live["gaps"] == whole["gaps"]
+
+
+def yaw(q: tuple[float, ...]) -> float:
+    w, x, y, z = q
+    return float(np.degrees(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
+
+
+def drifting(n: int) -> tuple[int, list[float], list[float]]:
+    """Level, turned by 10 deg/s at 100 Hz, with 0.4 deg/s of bias."""
+    return 10**9 + n * 10**7, [0.0, 0.0, float(np.radians(10.4))], [0.0, 0.0, 9.80665]
+
+
+def test_a_heading_is_set_and_measured() -> None:
+    est = strapd.Estimator()
+    with pytest.raises(ValueError, match="no sample has come yet"):
+        est.set_heading(0)
+    told = {}
+    for n in range(9000):
+        t, gyr, acc = drifting(n)
+        if n == 1000:
+            est.set_heading(-77)
+        if n > 2000 and n % 100 == 0:
+            # 300 ms late, of a world that is 40 degrees off.
+            est.measure_heading(40 + 0.1 * (n - 30), 2.0, t=t - 300_000_000)
+        told[n] = est.push_one(gyr, acc, t=t)
+    last = {n: yaw(said[1]) for n, said in told.items() if said is not None}
+    assert abs(last[1000] + 77) < 1e-6
+    for n in range(4000, 9000, 500):
+        off = (last[n] - 40 - 0.1 * n + 180) % 360 - 180
+        assert abs(off) < 1, (n, off)
+    assert est.headings["turns"] == 1 and est.headings["doubted"] == 0 and est.headings["used"] >= 68
+    for heading, sigma in [(float("nan"), 1), (0, 0), (0, -1), (1e9, 1)]:
+        with pytest.raises(ValueError, match="heading, sigma: degrees"):
+            est.measure_heading(heading, sigma)
+    alone = strapd.Estimator(aid="none")
+    alone.push_one([0, 0, 1], t=0)
+    for ask in (lambda: alone.set_heading(0), lambda: alone.measure_heading(0, 1)):
+        with pytest.raises(ValueError, match="whose vertical is known"):
+            ask()

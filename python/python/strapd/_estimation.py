@@ -213,6 +213,29 @@ class Estimator(_strapd.Live):
         )
         return Attitude(columns, self.summary)
 
+    def set_heading(self, heading: float) -> None:
+        """Sets the heading of the next sample, degrees, as the yaw of the attitudes: ``set_heading(0)`` is a tare.
+
+        Tilt, bias and their sigmas stay; the attitude says ``reset``.
+        """
+        super().set_heading(heading)
+
+    def measure_heading(self, heading: float, sigma: float, t: Any = None) -> None:
+        """Takes a heading that something else has measured: a course of GNSS, a compass, another tracker.
+
+        :param heading: degrees, as the yaw of the attitudes; a course clockwise from north is ``90 - course`` in ENU.
+        :param sigma: one standard deviation, degrees.
+        :param t: its stamp on the clock of the samples, up to 3 s back; without it that of the next sample.
+
+        Without a magnetometer the first turns the world to it; the others correct heading and bias. ``headings`` counts.
+        """
+        super().measure_heading(heading, sigma, t)
+
+    @property
+    def headings(self) -> dict[str, int]:
+        """Measured headings so far: ``used``, ``doubted`` (beyond four sigmas), ``unpaired``, and ``turns`` of the world."""
+        return dict(zip(("used", "doubted", "unpaired", "turns"), self.heading_counts()))
+
     def finish(self) -> Attitude:
         """No more samples: the attitudes that waited for some. The estimator is closed."""
         columns = self.finish_rows()

@@ -19,6 +19,11 @@ impl Estimator {
         self.integrator.turn_heading(heading)
     }
 
+    /// Does the same by a heading (rad) in the world of the attitudes that are given.
+    pub fn set_heading(&mut self, heading: f64) -> bool {
+        self.turn_heading(self.asked.own_heading(heading))
+    }
+
     /// Takes a heading that something else than the sensor has measured: a course of GNSS, a compass, another tracker, as
     /// the yaw of the attitudes in their own world; see [`AidedPropagator::take_heading`]. `stamp` is on the clock of the
     /// samples. `false`, and nothing changes, where nothing can use it: a gyro alone has no vertical to turn about, and a
