@@ -294,3 +294,25 @@ fn however_much_comes_at_once_the_bits_are_those_of_one_after_the_other() {
         }
     }
 }
+
+#[test]
+fn a_smoother_has_the_same_bits_however_much_comes_at_once() {
+    let raw = with_fields(hand(20, HZ));
+    let plan = EstimationSettings {
+        method: Method::Auto,
+        smooth: true,
+        ..plan(Aid::GravityAndField, SampleKind::Average, SpikePolicy::Keep)
+    };
+    let meaning = Meaning::new(&plan, &Declared::default());
+    let first = raw.iter().find(|raw| !raw.is_beside).unwrap();
+    let prepared = at_once(&plan, &meaning, std::slice::from_ref(first)).unwrap();
+    let of = |piece: usize| {
+        let mut estimator = Estimator::new(&plan, &meaning, &prepared).unwrap();
+        attitudes(&mut estimator, &raw, piece)
+    };
+    let expected = of(1);
+    assert!(expected.len() > 3900, "{}", expected.len());
+    for piece in [7, raw.len()] {
+        assert!(of(piece) == expected, "in pieces of {piece}");
+    }
+}
