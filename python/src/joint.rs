@@ -28,7 +28,10 @@ pub fn relative<'py>(
     let heading: RelativeHeading = heading
         .parse()
         .map_err(|e: Diagnostic| argument(e.at(format_args!("heading: {heading:?}"))))?;
-    let from = [convention("world", world)?, convention("second_world", second_world)?];
+    let from = [
+        convention("world", world)?,
+        convention("second_world", second_world)?,
+    ];
     let first = stamped("a", &t, &q, from[0])?;
     let second = stamped("b", &second_t, &second_q, from[1])?;
     let covariances = |cov: Option<Rows<'py>>, rows, from| {
@@ -72,7 +75,10 @@ pub fn relative<'py>(
     let fit = found.hinge.as_ref().ok();
     dict.set_item("hinge", fit.map(|fit| hinge(py, fit)).transpose()?)?;
     let why = found.hinge.as_ref().err();
-    dict.set_item("no_hinge", why.map(|why| Diagnostic::from(why).what().to_owned()))?;
+    dict.set_item(
+        "no_hinge",
+        why.map(|why| Diagnostic::from(why).what().to_owned()),
+    )?;
     Ok(dict)
 }
 

@@ -59,7 +59,9 @@ impl Live {
         self.check_open(py)?;
         match &mut self.running {
             Some((estimator, _)) => Ok(estimator),
-            None => Err(argument("heading: no sample has come yet, whose it could be")),
+            None => Err(argument(
+                "heading: no sample has come yet, whose it could be",
+            )),
         }
     }
 
