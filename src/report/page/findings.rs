@@ -51,6 +51,7 @@ impl FindingRow {
 fn answered(code: &str, plan: &EstimationSettings) -> Option<&'static str> {
     let (is_given, flag) = match code {
         "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
+        "unit-unknown" => (plan.gyro_scale != [1.0; 3], "--gyro-scale"),
         "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
         "looks-frd" if plan.is_accel_kinematic => (true, "--accel-sign"),
         "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),

@@ -66,16 +66,16 @@ impl Link {
         else {
             return;
         };
+        // An attitude is none of strapd's own, and its sender names no sensor.
+        let Content::Imu { rate, force } = sample.content else {
+            return;
+        };
         let own = (found.system, found.component);
         let first = *self.first.get_or_insert(own);
         let mut id = topic(spec.name, sample.sensor, own, first);
         if let Some(prefix) = prefix {
             id = format!("{prefix}/{id}");
         }
-        // An attitude is none of strapd's own.
-        let Content::Imu { rate, force } = sample.content else {
-            return;
-        };
         if rate.iter().chain(&force).any(|value| !value.is_finite()) {
             return;
         }

@@ -30,8 +30,9 @@ pub(crate) struct Transcriber {
     sequences: Sequences,
     channels: BTreeMap<Sender, (u16, u32)>,
     schemas: BTreeSet<u16>,
-    /// The first that sent a sample: its topics have plain names.
-    first: Option<(u8, u8)>,
+    /// The first that sent a sample, by its schema: its topics have plain names. A camera's mount that sends its attitude
+    /// before the vehicle's sensors are heard takes no name from them.
+    first: BTreeMap<u16, (u8, u8)>,
     message: Vec<u8>,
 }
 
@@ -115,17 +116,17 @@ impl Transcriber {
         };
         let own = (found.system, found.component);
         let sender = (own.0, own.1, known.name, sample.sensor);
-        let first = *self.first.get_or_insert(own);
+        let (schema, of) = match sample.content {
+            Content::Imu { .. } => (1, imu::TYPE),
+            Content::Attitude(_) => (2, imu::ATTITUDE_TYPE),
+        };
+        let first = *self.first.entry(schema).or_insert(own);
         let next = self.channels.len();
         let (channel, count) = match self.channels.get_mut(&sender) {
             Some(known) => known,
             None => {
                 let Some(number) = u16::try_from(next).ok().filter(|n| *n < u16::MAX) else {
                     return self.walk.fault(ProblemKind::TooManyDefinitions, None);
-                };
-                let (schema, of) = match sample.content {
-                    Content::Imu { .. } => (1, imu::TYPE),
-                    Content::Attitude(_) => (2, imu::ATTITUDE_TYPE),
                 };
                 if self.schemas.insert(schema) {
                     let text = known_definition(of).unwrap_or_default();
