@@ -6,6 +6,7 @@
 //!
 //! ```text
 //! Reading -> blocks (20 ms, bias of rest) -> segment (4 s: scatter of gravity under a map) -> bank (evidence) -> refine
+//! where no map of the bank explains it -> finer (unit and axes at once, factors of single axes, a turned gyro)
 //! segments in order -> change (other axes from one moment on)
 //! ```
 //!
@@ -18,6 +19,7 @@ mod bank;
 mod blocks;
 mod change;
 mod field;
+mod finer;
 mod refine;
 mod segment;
 #[cfg(test)]
@@ -29,6 +31,7 @@ use self::blocks::{Block, Blocks, Rest, Step};
 pub use self::change::AxesChange;
 use self::change::Sound;
 pub use self::field::{FieldConsistency, FieldDisagreement, FieldIron, FieldReading};
+use self::finer::Finer;
 use self::refine::refine;
 use self::segment::{SEGMENT_SECS, Segment};
 use crate::frames::AxisMap;
@@ -57,6 +60,11 @@ const GATE_BACK: usize = 3;
 const REFINED_BY: usize = 32;
 /// Segments in a row for which a verdict holds before it is said.
 const HOLD: usize = 3;
+/// Maps beyond the bank are looked for after so many segments, after twice as many, and so on; and at the end.
+const FINER_FIRST: usize = 8;
+/// Least segments for that at the end, and their median scatter as recorded, g, where the bank was never opened.
+const FINER_LEAST: usize = 4;
+const FINER_SCATTER: f64 = 0.03;
 /// Segments after which the bank of a live stream closes, if the last ones do not scatter and nothing was found.
 const OPEN_LEAST: usize = 64;
 /// Segments that move, without a bank, after which a live stream counts as sound.
@@ -82,12 +90,30 @@ pub enum Cause {
         map: AxisMap,
         /// Recorded axes whose place the motion decides.
         decided: [bool; 3],
+        /// Factor of true rates by recorded ones where the unit is wrong, too, and one standard deviation as a share.
+        scale: Option<(f64, f64)>,
     },
     /// Scale, or unit, of the gyro.
     Scale {
         /// True rates are so many times the recorded ones.
         factor: f64,
         /// One standard deviation of the factor, as a share of it.
+        sigma: f64,
+    },
+    /// Scale of single axes of the gyro.
+    Scales {
+        /// True rates by recorded ones, x, y, z.
+        factors: [f64; 3],
+        /// Largest standard deviation of a factor.
+        sigma: f64,
+    },
+    /// Mounting of the gyro against the accelerometer.
+    Turned {
+        /// Rotation that makes true rates of recorded ones, in the axes of the accelerometer.
+        by: Matrix3<f64>,
+        /// Angle of it, rad.
+        angle: f64,
+        /// Largest standard deviation about an axis, rad.
         sigma: f64,
     },
     /// Unknown, since no map explains it: the rates are wrong, or gravity stays with the body.
@@ -122,6 +148,9 @@ pub struct Consistency {
     bank: Option<Evidence>,
     held: usize,
     settled: Option<Verdict>,
+    /// Map that the bank has not, and how many segments the bank has judged.
+    finer: Option<Finer>,
+    judged: usize,
     /// Segments in which gravity stood still, for what comes later.
     sound: Sound,
     /// Axes that are others from one moment on, and how often in a row they were seen.
@@ -147,6 +176,8 @@ impl Default for Consistency {
             bank: None,
             held: 0,
             settled: None,
+            finer: None,
+            judged: 0,
             sound: Sound::default(),
             change: None,
             change_held: 0,
@@ -169,13 +200,17 @@ impl Consistency {
     /// Whether gravity stood still through a minute and more of motion.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.settled.is_none() && self.bank.is_none() && self.moved >= SOUND_LEAST
+        self.says_nothing() && self.bank.is_none() && self.moved >= SOUND_LEAST
     }
 
     /// Whether nothing speaks against the gyro: no disagreement, no change of its axes.
     #[must_use]
     pub fn agrees(&self) -> bool {
-        self.settled.is_none() && self.axes_change().is_none()
+        self.says_nothing() && self.axes_change().is_none()
+    }
+
+    fn says_nothing(&self) -> bool {
+        self.settled.is_none() && self.finer.is_none()
     }
 
     /// Axes of the gyro that are others from one moment on; `None` where they are not, or too little motion on either
@@ -207,31 +242,55 @@ impl Consistency {
     /// Disagreement that is seen; `None` where there is none, or too little motion to tell.
     #[must_use]
     pub fn disagreement(&self) -> Option<Disagreement> {
+        if let Some(finer) = self.finer.or_else(|| self.finer_at_the_end()) {
+            return Some(finer.disagreement());
+        }
         let verdict = self.settled?;
         let cause = match verdict.answer {
             Answer::Map(decided) => BANK
                 .get(verdict.hypothesis)
                 .and_then(|hypothesis| AxisMap::from_matrix(&hypothesis.map))
-                .map(|map| (Cause::Axes { map, decided }, verdict.found)),
+                .map(|map| {
+                    (
+                        Cause::Axes {
+                            map,
+                            decided,
+                            scale: None,
+                        },
+                        verdict.found,
+                    )
+                }),
             Answer::Factor => self.refined(&verdict),
             Answer::Contradiction => None,
         };
         let (cause, cured) = cause.unwrap_or((Cause::Unknown, verdict.found));
         Some(Disagreement {
             cause,
-            recorded: verdict.identity,
+            recorded: verdict.recorded,
             cured,
             segments: verdict.segments,
         })
     }
 
-    /// Median scatter of gravity in the last segments when true rates are `factor` times the recorded ones, g; `None`
-    /// where there is nothing to judge by.
+    /// Median scatter of gravity in the last segments when true rates are `factor` times the recorded ones of
+    /// other axes, g; `None` where there is nothing to judge by.
     #[must_use]
-    pub fn scatter_by(&self, factor: f64) -> Option<f64> {
-        let map = Matrix3::from_diagonal_element(factor);
+    pub fn scatter_by(&self, axes: AxisMap, factor: f64) -> Option<f64> {
+        let map = axes.matrix() * factor;
         let found = refine::<3>(self.kept.iter(), &map, &[])?;
         Some(found.left).filter(|left| left.is_finite())
+    }
+
+    /// A map that the bank has not, by the last segments of a recording.
+    fn finer_at_the_end(&self) -> Option<Finer> {
+        if self.is_live || self.kept.len() < FINER_LEAST {
+            return None;
+        }
+        let segments: Vec<&Segment> = self.kept.iter().collect();
+        match self.bank {
+            Some(_) => finer::finer(&segments, self.settled.as_ref()),
+            None => finer::nearby(&segments, FINER_SCATTER),
+        }
     }
 
     /// The factor near that of the bank which makes gravity stand still best.
@@ -273,7 +332,7 @@ impl Consistency {
         if self.bank.is_none() && !opens && is_still {
             self.kept = VecDeque::new();
         }
-        if self.moved >= OPEN_LEAST && is_still && self.settled.is_none() && self.bank.is_some() {
+        if self.moved >= OPEN_LEAST && is_still && self.says_nothing() && self.bank.is_some() {
             self.bank = None;
             self.moved = 0;
         }
@@ -296,7 +355,10 @@ impl Consistency {
             self.scattered.pop_front();
         }
         self.kept.push_back(segment);
-        let most = self.bank.as_ref().map_or(GATE_BACK + 1, |_| REFINED_BY);
+        let most = match self.bank.is_none() && self.is_live {
+            true => GATE_BACK + 1,
+            false => REFINED_BY,
+        };
         if self.kept.len() > most {
             self.kept.pop_front();
         }
@@ -316,7 +378,10 @@ impl Consistency {
             None if opens => {
                 self.moved = 0;
                 let bank = self.bank.insert(Evidence::new());
-                self.kept.iter().for_each(|segment| bank.push(segment));
+                let before = self.kept.len().saturating_sub(GATE_BACK + 1);
+                let kept = self.kept.iter().skip(before);
+                kept.for_each(|segment| bank.push(segment));
+                self.judged = GATE_BACK.min(self.kept.len() - 1);
             }
             None => return,
         }
@@ -325,6 +390,12 @@ impl Consistency {
         self.look_for_change();
         if self.held >= HOLD {
             self.settled = verdict;
+        }
+        self.judged += 1;
+        if self.judged >= FINER_FIRST && self.judged.is_power_of_two() {
+            let segments: Vec<&Segment> = self.kept.iter().collect();
+            let known = self.finer.filter(|finer| finer.holds(&segments));
+            self.finer = finer::finer(&segments, self.settled.as_ref()).or(known);
         }
     }
 

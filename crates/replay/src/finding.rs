@@ -12,9 +12,10 @@ pub(crate) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
 pub(crate) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
 pub(crate) const GYRO_AXES_CHANGE: &str = "gyro-axes-change";
 /// Codes of a sensor that is read in wrong axes, by a wrong factor or in a wrong unit: the data show the right one.
-const MISREAD: [&str; 5] = [
+const MISREAD: [&str; 6] = [
     "gyro-axes",
     "gyro-scale",
+    "gyro-turned",
     "unit-degrees",
     "unit-unknown",
     "mag-axes",

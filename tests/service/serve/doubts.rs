@@ -78,7 +78,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 18] = [
+const FAULTS: [Fault; 20] = [
     ("good", |_, _| {}, "", ""),
     (
         "reversed",
@@ -109,6 +109,21 @@ const FAULTS: [Fault; 18] = [
         |_, s| s.gyro = s.gyro.map(f64::to_degrees),
         "unit-against-gravity",
         "gyro_unit deg",
+    ),
+    (
+        "swapped, degrees",
+        |_, s| {
+            s.gyro.swap(0, 1);
+            s.gyro = s.gyro.map(f64::to_degrees);
+        },
+        "gyro-axes",
+        "gyro_unit deg",
+    ),
+    (
+        "one axis doubled",
+        |_, s| s.gyro[1] *= 2.0,
+        "gyro-scale",
+        ",0.",
     ),
     (
         "clipped",

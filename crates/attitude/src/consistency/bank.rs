@@ -30,13 +30,13 @@ pub const CHIPS: [(f64, u32); 8] = [
 ];
 /// Factors that units and ranges make, beside the counts of chips: a hand turns ten rad in a segment, of which the 12 %
 /// between two powers leave nothing that stands still.
-const UNITS: [f64; 5] = [DEGREE, 1.0 / DEGREE, 1e-3, 0.5, 2.0];
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
+pub(super) const UNITS: [f64; 5] = [DEGREE, 1.0 / DEGREE, 1e-3, 0.5, 2.0];
+pub(super) const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Hypotheses in the bank.
 const HYPOTHESES: usize = MAPS + 51 + UNITS.len() + CHIPS.len();
 /// Least mean force of what stands still, g: rates of any other size turn gravity until nothing of it is left, and
 /// nothing does not wander.
-const LEAST_GRAVITY: f64 = 0.5;
+pub(super) const LEAST_GRAVITY: f64 = 0.5;
 /// Segments that count: what came before is forgotten.
 const MEMORY: usize = 64;
 /// Scatter of gravity that is none, g^2.
@@ -64,7 +64,7 @@ const LARGEST_FOUND_SHAKEN: f64 = 0.15;
 const LARGEST_RATIO_SHAKEN: f64 = 0.4;
 /// Least scatter of the identity, g; where physics makes gravity turn less than the body.
 const LEAST_IDENTITY: f64 = 0.05;
-const LEAST_IDENTITY_LESS: f64 = 0.09;
+pub(super) const LEAST_IDENTITY_LESS: f64 = 0.09;
 /// A factor below this is a unit.
 const UNIT_BELOW: f64 = 0.1;
 
@@ -232,6 +232,8 @@ pub(super) struct Verdict {
     /// Median scatter of gravity as recorded, and under the hypothesis, g.
     pub(super) identity: f64,
     pub(super) found: f64,
+    /// Scatter as recorded, g, with what is missing of gravity where another map has it.
+    pub(super) recorded: f64,
     /// Share of the telling segments that agree, and their number.
     pub(super) share: f64,
     pub(super) segments: usize,
@@ -247,10 +249,15 @@ pub(super) struct Evidence {
 
 impl Evidence {
     pub(super) fn new() -> Evidence {
+        Evidence::of(HYPOTHESES)
+    }
+
+    /// Evidence for the first so many hypotheses of the bank.
+    pub(super) fn of(hypotheses: usize) -> Evidence {
         Evidence {
-            residuals: Residuals::new(HYPOTHESES),
+            residuals: Residuals::new(hypotheses),
             rows: VecDeque::new(),
-            sums: vec![0.0; HYPOTHESES],
+            sums: vec![0.0; hypotheses],
         }
     }
 
@@ -270,6 +277,12 @@ impl Evidence {
                 *sum -= oldest.evidence(h);
             }
         }
+    }
+
+    /// Evidence of the map that has most.
+    pub(super) fn most(&self) -> f64 {
+        let maps = self.sums.iter().take(MAPS).copied();
+        maps.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Rows, the oldest first, with beginning and end of their segments.
@@ -306,7 +319,7 @@ impl Evidence {
         if most < LEAST_EVIDENCE {
             return None;
         }
-        let mut sums = vec![0.0; HYPOTHESES];
+        let mut sums = vec![0.0; self.sums.len()];
         for row in self.rows.iter().skip(cut) {
             for (h, sum) in sums.iter_mut().enumerate() {
                 *sum += row.evidence(h);
@@ -365,6 +378,7 @@ impl Evidence {
             hypothesis: chosen,
             evidence,
             identity: wanders,
+            recorded: identity,
             found,
             share,
             segments: telling.len(),

@@ -20,6 +20,8 @@ const FLOOR: f64 = 2.5e-4;
 pub(super) struct Refined<const P: usize> {
     /// True rates by recorded ones.
     pub(super) map: Matrix3<f64>,
+    /// Bias of the recorded rates that is left, rad/s, its sign such that it is added.
+    pub(super) bias: Vector3<f64>,
     /// One standard deviation of the bias (rad/s) and of the shares of the directions, by a sandwich of the segments' own scatter.
     pub(super) sigma: SVector<f64, P>,
     /// Median scatter of gravity that is left, g.
@@ -60,6 +62,7 @@ pub(super) fn refine<'a, const P: usize>(
     left.sort_by(f64::total_cmp);
     Some(Refined {
         map,
+        bias: bias_of(&map, &x),
         sigma: covariance.diagonal().map(f64::sqrt),
         left: left.get(left.len() / 2)?.max(0.0).sqrt(),
     })
@@ -72,14 +75,19 @@ fn scatters<'a, const P: usize>(
     directions: &[Matrix3<f64>],
     x: &SVector<f64, P>,
 ) -> Vec<Scatter<P>> {
-    let recorded = map.pseudo_inverse(1e-3 * map.norm());
-    let bias = recorded.map_or_else(
-        |_| Vector3::zeros(),
-        |recorded| recorded * Vector3::new(x[0], x[1], x[2]),
-    );
+    let bias = bias_of(map, x);
     segments
         .map(|segment| segment.scatter(map, directions, &bias))
         .collect()
+}
+
+/// Bias of the recorded rates, to be added, from the one of the true rates at the head of `x`.
+fn bias_of<const P: usize>(map: &Matrix3<f64>, x: &SVector<f64, P>) -> Vector3<f64> {
+    let recorded = map.pseudo_inverse(1e-3 * map.norm());
+    recorded.map_or_else(
+        |_| Vector3::zeros(),
+        |recorded| recorded * Vector3::new(x[0], x[1], x[2]),
+    )
 }
 
 type Square<const P: usize> = SMatrix<f64, P, P>;

@@ -106,6 +106,18 @@ impl Segment {
         }
     }
 
+    /// The same with rates of another unit: `factor` times those that were taken.
+    pub(super) fn times(&self, factor: f64) -> Segment {
+        let scaled = |piece: &Piece| Piece {
+            angle: piece.angle * factor,
+            ..*piece
+        };
+        Segment {
+            pieces: self.pieces.iter().map(scaled).collect(),
+            ..*self
+        }
+    }
+
     /// Whether the gyro turned, or the force changed, enough to say something.
     pub(super) fn moves(&self) -> bool {
         let turned: f64 = self.pieces.iter().map(|piece| piece.angle.norm()).sum();

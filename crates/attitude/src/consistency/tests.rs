@@ -190,7 +190,12 @@ fn a_disagreement_names_what_cures_it() {
     // Recorded x is true -y, and so on.
     let recorded = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
     let found = watched(&samples, &recorded).disagreement().unwrap();
-    let Cause::Axes { map, decided } = found.cause else {
+    let Cause::Axes {
+        map,
+        decided,
+        scale: None,
+    } = found.cause
+    else {
         panic!("{found:?}")
     };
     assert_eq!((map.to_string().as_str(), decided), ("ZxY", [true; 3]));
@@ -203,6 +208,55 @@ fn a_disagreement_names_what_cures_it() {
         };
         assert!((by * factor - 1.0).abs() < 0.02, "{factor}: {found:?}");
         assert!(sigma < 0.05 && found.cured < 0.01, "{found:?}");
+    }
+}
+
+#[test]
+fn what_no_map_of_the_bank_explains_is_named_all_the_same() {
+    let samples = simulate(3000, 2.0);
+    let swapped = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    for recorded in [57.29578, 2.0, 0.5, 16.4 * 57.29578, 1e3] {
+        let found = watched(&samples, &(swapped * recorded));
+        let found = found.disagreement().unwrap_or_else(|| panic!("{recorded}"));
+        let Cause::Axes {
+            map,
+            decided,
+            scale: Some((factor, sigma)),
+        } = found.cause
+        else {
+            panic!("{recorded}: {found:?}")
+        };
+        assert_eq!((map.to_string().as_str(), decided), ("YxZ", [true; 3]));
+        assert!((factor * recorded - 1.0).abs() < 0.02, "{found:?}");
+        assert!(sigma < 0.05 && found.cured < 0.01 && found.recorded > 0.05);
+    }
+    for (x, y, z) in [(1.0, 1.0, 0.6), (1.0, 2.0, 1.0), (0.5, 1.0, 2.0)] {
+        let found = watched(&samples, &diagonal(x, y, z)).disagreement();
+        let found = found.unwrap_or_else(|| panic!("{x} {y} {z}"));
+        let Cause::Scales { factors, sigma } = found.cause else {
+            panic!("{found:?}")
+        };
+        let back = [factors[0] * x, factors[1] * y, factors[2] * z];
+        assert!(back.iter().all(|f| (f - 1.0).abs() < 0.03), "{found:?}");
+        assert!(sigma < 0.08 && found.cured < 0.01, "{found:?}");
+    }
+    for degrees in [20.0, -45.0] {
+        let axis = nalgebra::Unit::new_normalize(Vector3::new(1.0, 2.0, -2.0));
+        let by = nalgebra::Rotation3::from_axis_angle(&axis, f64::to_radians(degrees));
+        let found = watched(&samples, by.matrix()).disagreement();
+        let found = found.unwrap_or_else(|| panic!("{degrees}"));
+        let Cause::Turned {
+            by: back, angle, ..
+        } = found.cause
+        else {
+            panic!("{found:?}")
+        };
+        assert!(
+            (angle.to_degrees() - degrees.abs()).abs() < 1.0,
+            "{found:?}"
+        );
+        let left = (back * by.matrix() - Matrix3::identity()).abs().max();
+        assert!(left < 0.02 && found.cured < 0.01, "{found:?}");
     }
 }
 

@@ -110,7 +110,7 @@ impl AxisMap {
     }
 
     /// Signed permutation matrix, for kernels.
-    pub(crate) fn matrix(self) -> Matrix3<f64> {
+    pub fn matrix(self) -> Matrix3<f64> {
         let column = |unit: [f64; 3]| Vector3::from(self.apply(unit));
         Matrix3::from_columns(&[
             column([1.0, 0.0, 0.0]),

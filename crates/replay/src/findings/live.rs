@@ -16,9 +16,10 @@ use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 14] = [
+const LASTING: [&str; 15] = [
     "gyro-axes",
     "gyro-scale",
+    "gyro-turned",
     "gyro-against-gravity",
     "mag-axes",
     "mag-iron",
@@ -33,7 +34,12 @@ const LASTING: [&str; 14] = [
     GYRO_AXES_CHANGE,
 ];
 /// Codes of those about gyro and gravity.
-const OF_GYRO: [&str; 3] = ["gyro-axes", "gyro-scale", "gyro-against-gravity"];
+const OF_GYRO: [&str; 4] = [
+    "gyro-axes",
+    "gyro-scale",
+    "gyro-turned",
+    "gyro-against-gravity",
+];
 /// Segments with a field after which it is judged after every fourth alone.
 const OFTEN: usize = 24;
 /// Speeds of a stamp clock by arrival that are judged: beyond, a recording is sent, or the unit is another.

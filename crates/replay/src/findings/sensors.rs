@@ -5,6 +5,7 @@
 
 use super::{Finding, Severity};
 use crate::summary::significant;
+use nalgebra::Matrix3;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::consistency::{CHIPS, Cause, Consistency, Disagreement};
 use strapd_attitude::estimate::{EstimationSettings, Meaning};
@@ -14,6 +15,7 @@ use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 /// Codes of the findings here that name a cause.
 const AXES: &str = "gyro-axes";
 const SCALE: &str = "gyro-scale";
+const TURNED: &str = "gyro-turned";
 /// Findings that have only a guess where a cause is named.
 const GUESSES: [&str; 3] = ["unit-against-gravity", "unit-degrees", "unit-unknown"];
 /// Findings that rates in a wrong unit bring with them.
@@ -23,6 +25,13 @@ const KNOWN: f64 = 0.05;
 /// A known factor is as far as this from the measured one, in sigmas and as a share; a sigma holds to a factor of four.
 const SIGMAS: f64 = 3.0;
 const NEAR: std::ops::Range<f64> = 0.02..0.06;
+/// The same, and least scatter as recorded, g, of scales of single axes that are certain.
+const CLEAR: f64 = 0.3;
+const CLEARLY: f64 = 0.05;
+/// Largest entry of the matrix of a calibration file.
+const LARGEST_IN_FILE: f64 = 0.3;
+/// A factor of a single axis that is told.
+const SINGLE: f64 = 0.12;
 /// A factor below this, or above its inverse, is another unit.
 const UNIT: f64 = 0.1;
 /// Scatter of gravity of a cure, by that as recorded.
@@ -41,7 +50,17 @@ pub(super) fn disagreement(
 ) -> Option<Finding> {
     let found = consistency.disagreement()?;
     let finding = match found.cause {
-        Cause::Axes { map, decided } => of_axes(&found, (map, decided), plan),
+        Cause::Axes {
+            map,
+            decided,
+            scale,
+        } => of_axes(
+            (&found, consistency),
+            (map, decided, scale),
+            (plan, resolved.unit),
+        ),
+        Cause::Scales { factors, sigma } => of_scales(&found, (factors, sigma), plan),
+        Cause::Turned { by, angle, sigma } => of_turn(&found, (&by, angle, sigma), plan),
         Cause::Scale { factor, sigma } => of_scale(
             (&found, consistency),
             (factor, sigma),
@@ -65,23 +84,111 @@ pub(super) fn disagreement(
 }
 
 fn of_axes(
+    (found, consistency): (&Disagreement, &Consistency),
+    (map, decided, scale): (AxisMap, [bool; 3], Option<(f64, f64)>),
+    (plan, unit): (&EstimationSettings, GyroUnit),
+) -> Finding {
+    let axes = GYRO_AXES.to(map.after(plan.gyro_axes));
+    let finding = |words: &str| {
+        let axes = in_words(&map, decided);
+        let words = format!("gyro and accelerometer disagree: the true rate {axes}{words}");
+        Finding::new(Severity::Error, AXES, words)
+            .with("map", map.to_string())
+            .with("scatter_cured_g", found.cured)
+            .advise(tried(found.recorded, found.cured, "the gyro's axes mapped"))
+    };
+    let Some((factor, sigma)) = scale else {
+        return finding("").help([axes]);
+    };
+    let near = near((found, consistency), (map, factor, sigma), (plan, unit));
+    if near.is_empty() {
+        let times = format!(", times {}", significant(factor, 3));
+        let all = finding(&times).with("factor", factor);
+        return all.help([axes, scaled(plan, factor)]);
+    }
+    let words: Vec<&str> = near.iter().map(|named| named.words.as_str()).collect();
+    let all = finding(&format!("; {}", words.join(", or "))).with("factor", factor);
+    near.into_iter()
+        .fold(all, |all, named| all.help([axes.clone(), named.cure]))
+}
+
+/// Finding that single axes of the gyro have a scale of their own.
+fn of_scales(
     found: &Disagreement,
-    (map, decided): (AxisMap, [bool; 3]),
+    (factors, sigma): ([f64; 3], f64),
     plan: &EstimationSettings,
 ) -> Finding {
-    let names = map.to_string();
+    let axes = ["x", "y", "z"].into_iter().zip(factors);
+    let off = axes.filter(|(_, factor)| (factor - 1.0).abs() > (SIGMAS * sigma).max(SINGLE));
+    let words: Vec<String> = off
+        .map(|(axis, factor)| format!("{} times the recorded about {axis}", significant(factor, 3)))
+        .collect();
+    // The settings scale the columns as recorded, before their axes are mapped.
+    let axes = plan.gyro_axes.matrix();
+    let of_column = |column: usize| -> f64 {
+        let share = (0..3).map(|axis| axes[(axis, column)].abs() * factors[axis]);
+        share.sum()
+    };
+    let own = plan.gyro_scale;
+    let scales: Vec<String> = (0..3)
+        .map(|column| significant(own[column] * of_column(column), 4))
+        .collect();
+    let is_clear = found.cured <= CLEAR * found.recorded && found.recorded >= CLEARLY;
+    let severity = if is_clear {
+        Severity::Error
+    } else {
+        Severity::Warning
+    };
     Finding::new(
-        Severity::Error,
-        AXES,
+        severity,
+        SCALE,
         format!(
-            "gyro and accelerometer disagree: the true rate {}",
-            in_words(&map, decided)
+            "gyro and accelerometer disagree: true rates are {} (+- {})",
+            words.join(", "),
+            significant(sigma.max(1e-3), 1)
         ),
     )
-    .with("map", names)
+    .with("factors", factors.to_vec())
+    .with("sigma", sigma)
     .with("scatter_cured_g", found.cured)
-    .advise(tried(found.recorded, found.cured, "the gyro's axes mapped"))
-    .help([GYRO_AXES.to(map.after(plan.gyro_axes))])
+    .advise(tried(found.recorded, found.cured, "the rates scaled"))
+    .help([GYRO_SCALE.to(scales.join(","))])
+}
+
+/// Finding that the gyro is turned against the accelerometer.
+fn of_turn(
+    found: &Disagreement,
+    (by, angle, sigma): (&Matrix3<f64>, f64, f64),
+    plan: &EstimationSettings,
+) -> Finding {
+    // What a calibration file multiplies by comes before the axes are mapped.
+    let axes = plan.gyro_axes.matrix();
+    let errors = axes.transpose() * by * axes - Matrix3::identity();
+    let rows: Vec<String> = errors
+        .row_iter()
+        .map(|row| format!("[{:.4}, {:.4}, {:.4}]", row[0], row[1], row[2]))
+        .collect();
+    let cure = match plan.calibration.is_none() && errors.abs().max() <= LARGEST_IN_FILE {
+        true => format!(
+            "a calibration file with `G = [{}]` turns it back",
+            rows.join(", ")
+        ),
+        false => "no setting turns the gyro alone by such an angle".to_owned(),
+    };
+    let tried = tried(found.recorded, found.cured, "the gyro turned back");
+    Finding::new(
+        Severity::Warning,
+        TURNED,
+        format!(
+            "gyro and accelerometer disagree: one is turned by {} degrees (+- {}) against the other",
+            significant(angle.to_degrees(), 2),
+            significant(sigma.to_degrees().max(0.1), 1)
+        ),
+    )
+    .with("angle_deg", angle.to_degrees())
+    .with("sigma_deg", sigma.to_degrees())
+    .with("scatter_cured_g", found.cured)
+    .advise(format!("{tried}; {cure}"))
 }
 
 /// Axes whose place is decided, in words.
@@ -139,17 +246,11 @@ fn of_scale(
     if !is_known {
         return finding("").advise("give the gyro's unit, or its scale");
     }
-    let near: Vec<Named> = named(plan, unit)
-        .into_iter()
-        .filter(|named| {
-            let off = (named.factor / factor - 1.0).abs();
-            off <= (SIGMAS * sigma).clamp(NEAR.start, NEAR.end)
-        })
-        .filter_map(|named| {
-            let cured = consistency.scatter_by(named.factor)?;
-            (cured <= CURED * found.recorded).then_some(named)
-        })
-        .collect();
+    let near = near(
+        (found, consistency),
+        (AxisMap::IDENTITY, factor, sigma),
+        (plan, unit),
+    );
     if near.is_empty() {
         let scaled = scaled(plan, factor);
         return finding("")
@@ -163,6 +264,21 @@ fn of_scale(
         .advise(tried(found.recorded, found.cured, "the rates scaled"));
     near.into_iter()
         .fold(all, |all, named| all.help([named.cure]))
+}
+
+/// Factors with a name that are near the measured one, by which the recording was integrated and agrees.
+fn near(
+    (found, consistency): (&Disagreement, &Consistency),
+    (axes, factor, sigma): (AxisMap, f64, f64),
+    (plan, unit): (&EstimationSettings, GyroUnit),
+) -> Vec<Named> {
+    let is_near = |named: &Named| {
+        let off = (named.factor / factor - 1.0).abs();
+        let cured = || consistency.scatter_by(axes, named.factor);
+        off <= (SIGMAS * sigma).clamp(NEAR.start, NEAR.end)
+            && cured().is_some_and(|cured| cured <= CURED * found.recorded)
+    };
+    named(plan, unit).into_iter().filter(is_near).collect()
 }
 
 /// Factors that rates are off by, other than by accident.

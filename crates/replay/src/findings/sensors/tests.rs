@@ -13,7 +13,16 @@ const RATE_HZ: i64 = 50;
 
 /// Half a minute of a body that rotates about every axis after 2 s of rest, and gravity's reaction alone.
 fn clean() -> Vec<RawSample> {
-    let mut motion = BandLimited::random(3, 0.8, 1.5, 6).unwrap();
+    moved(0.8, 1.5)
+}
+
+/// The same with larger turns, by which single axes are told.
+fn widely() -> Vec<RawSample> {
+    moved(1.5, 0.5)
+}
+
+fn moved(rms: f64, band: f64) -> Vec<RawSample> {
+    let mut motion = BandLimited::random(3, rms, band, 6).unwrap();
     let step = 1_000_000_000 / RATE_HZ;
     let sample = |k: i64| {
         let moving = (k - 2 * RATE_HZ).max(0);
@@ -51,6 +60,7 @@ fn found(samples: &[RawSample], given: &[Choice]) -> Vec<Finding> {
     let codes = [
         AXES,
         SCALE,
+        TURNED,
         "gyro-against-gravity",
         "unit-degrees",
         "under-sampled",
@@ -98,6 +108,87 @@ fn axes_of_the_gyro_are_named_and_the_map_that_is_advised_cures_them() {
             assert_eq!(found(&bad, &cured), [], "{cured:?}");
         }
     }
+}
+
+#[test]
+fn axes_in_another_unit_are_named_and_both_are_cured() {
+    let clean = clean();
+    let exchanged = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    for (factor, words) in [
+        (1_f64.to_degrees(), "; they look like deg/s"),
+        (131_f64.to_degrees(), "; counts of a range of 250 deg/s"),
+        (2.0, "; read with twice of its range"),
+    ] {
+        let bad = by_gyro(&clean, &(exchanged * factor));
+        for given in [vec![], vec![BODY.to("YxZ"), GYRO_AXES.to("zXY")]] {
+            let all = found(&bad, &given);
+            let finding = all.iter().find(|finding| finding.code == AXES);
+            let finding = finding.unwrap_or_else(|| panic!("{factor} {given:?}: {all:?}"));
+            assert!(finding.what.contains(words), "{finding:?}");
+            let mut cured = given;
+            cured.retain(|choice| choice.setting != GYRO_AXES);
+            cured.extend(finding.help[0].clone());
+            assert_eq!(found(&bad, &cured), [], "{cured:?}");
+        }
+    }
+}
+
+#[test]
+fn the_scale_of_single_axes_is_named_by_the_recorded_columns() {
+    let good = widely();
+    for scales in [[1.0, 2.0, 1.0], [1.0, 1.0, 0.6], [0.5, 1.0, 2.0]] {
+        let bad = by_gyro(&good, &Matrix3::from_diagonal(&scales.into()));
+        for given in [vec![], vec![BODY.to("frd")]] {
+            let all = found(&bad, &given);
+            let [finding] = all.as_slice() else {
+                panic!("{scales:?} {given:?}: {all:?}")
+            };
+            assert_eq!((finding.code, finding.severity), (SCALE, Severity::Error));
+            let mut cured = given;
+            cured.push(finding.help[0][0].clone());
+            let factors = cured.last().unwrap().value.split(',');
+            let left = factors
+                .zip(scales)
+                .map(|(f, s)| f.parse::<f64>().unwrap() * s - 1.0);
+            assert!(left.clone().all(|left| left.abs() < 0.03), "{finding:?}");
+            assert_eq!(found(&bad, &cured), [], "{cured:?}");
+        }
+    }
+    // Columns that are mapped: a factor belongs to what was recorded.
+    let exchanged = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let doubled = Matrix3::from_diagonal(&Vector3::new(2.0, 1.0, 1.0));
+    let all = found(
+        &by_gyro(&good, &(doubled * exchanged)),
+        &[GYRO_AXES.to("YXZ")],
+    );
+    let cure = &all[0].help[0][0];
+    assert!(
+        cure.value.starts_with("0.5") || cure.value.starts_with("0.49"),
+        "{all:?}"
+    );
+    assert!(all[0].what.contains("about y"), "{all:?}");
+}
+
+#[test]
+fn a_gyro_that_is_turned_is_said_with_the_matrix_that_turns_it_back() {
+    let axis = nalgebra::Unit::new_normalize(Vector3::new(1.0, 2.0, -2.0));
+    let turned = nalgebra::Rotation3::from_axis_angle(&axis, 0.2);
+    let all = found(&by_gyro(&widely(), turned.matrix()), &[]);
+    let [finding] = all.as_slice() else {
+        panic!("{all:?}")
+    };
+    assert_eq!(
+        (finding.code, finding.severity),
+        (TURNED, Severity::Warning)
+    );
+    let (_, matrix) = finding.advice.split_once("`G = ").unwrap();
+    let rows: Vec<Vec<f64>> = serde_json::from_str(matrix.split_once('`').unwrap().0).unwrap();
+    let by = Matrix3::from_fn(|row, column| rows[row][column]) + Matrix3::identity();
+    let left = (by * turned.matrix() - Matrix3::identity()).abs().max();
+    assert!(left < 0.01, "{left} {finding:?}");
+    let far = nalgebra::Rotation3::from_axis_angle(&axis, 0.7);
+    let all = found(&by_gyro(&widely(), far.matrix()), &[]);
+    assert!(all[0].advice.contains("no setting turns"), "{all:?}");
 }
 
 #[test]
