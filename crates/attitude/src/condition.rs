@@ -424,7 +424,7 @@ impl Conditioner {
                 let at = Nanos(batch_line.push(entry.stamp.0));
                 let repaired = self.spikes.as_mut().and_then(|spikes| {
                     let steps = (self.timing.spacing(), self.timing.coarse());
-                    spikes.repaired(entry, ahead, steps, &mut self.report.spikes)
+                    spikes.repaired(entry, ahead, steps, &mut self.report)
                 });
                 let entry = repaired.unwrap_or(*entry);
                 self.time_one(entry, at, out);
@@ -447,7 +447,7 @@ impl Conditioner {
             let (stamp, epoch) = (entry.stamp, entry.epoch);
             let repaired = self.spikes.as_mut().and_then(|spikes| {
                 let steps = (self.timing.spacing(), self.timing.coarse());
-                spikes.repaired(entry, ahead, steps, &mut self.report.spikes)
+                spikes.repaired(entry, ahead, steps, &mut self.report)
             });
             let entry = repaired.as_ref().unwrap_or(entry);
             let sample = self.timing.one(entry, stamp, ahead, &mut self.report);
@@ -509,7 +509,7 @@ impl Conditioner {
             let following = rest.get(i + 1..).unwrap_or_default();
             let repaired = self.spikes.as_mut().and_then(|spikes| {
                 let steps = (self.timing.spacing(), self.timing.coarse());
-                spikes.repaired(entry, following, steps, &mut self.report.spikes)
+                spikes.repaired(entry, following, steps, &mut self.report)
             });
             let mut entry = repaired.unwrap_or(*entry);
             if placement.moves(at) {

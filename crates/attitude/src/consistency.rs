@@ -242,7 +242,7 @@ impl Consistency {
     /// Disagreement that is seen; `None` where there is none, or too little motion to tell.
     #[must_use]
     pub fn disagreement(&self) -> Option<Disagreement> {
-        if let Some(finer) = self.finer.or_else(|| self.finer_at_the_end()) {
+        if let Some(finer) = self.finer_at_the_end().or(self.finer) {
             return Some(finer.disagreement());
         }
         let verdict = self.settled?;

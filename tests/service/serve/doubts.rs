@@ -78,7 +78,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 20] = [
+const FAULTS: [Fault; 21] = [
     ("good", |_, _| {}, "", ""),
     (
         "reversed",
@@ -130,6 +130,12 @@ const FAULTS: [Fault; 20] = [
         |_, s| s.gyro = s.gyro.map(|v| v.clamp(-1.1, 1.1)),
         "saturated",
         "gyro_range 1.1",
+    ),
+    (
+        "accelerometer's glitches",
+        |n, s| s.accel[0] += if n % 300 == 250 { 78.0 } else { 0.0 },
+        "accel-spikes",
+        "spikes keep",
     ),
     (
         "hangs",

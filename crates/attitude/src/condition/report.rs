@@ -133,6 +133,8 @@ pub struct Report {
     pub spikes: SpikeCount,
     /// Spikes that had left when what came behind them showed them, and were not taken back.
     pub spikes_left: SpikeCount,
+    /// Forces that were glitches of the accelerometer alone, and were left out.
+    pub force_spikes: SpikeCount,
     /// Two sensors that take turns in the stream; `None` where there is one.
     pub mixture: Option<Mixture>,
     /// Units that changed on the way.

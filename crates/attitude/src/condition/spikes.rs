@@ -7,10 +7,12 @@
 //! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), [`passed`] judges by
 //! the same rule what has left, and the estimator goes back to the state before it.
 
+mod force;
 pub(super) mod passed;
 
 use super::gate::{Entry, NO_ACCEL, finite_accel};
 use super::repairs::SpikePolicy;
+use super::report::Report;
 use super::settings::Settings;
 use crate::record::{Nanos, SampleKind, Status};
 use nalgebra::Vector3;
@@ -22,16 +24,16 @@ pub struct SpikeCount {
     pub samples: u64,
     /// Stamp of the first.
     pub first: Option<Nanos>,
-    /// Farthest that one was off the line between its neighbours, rad/s.
+    /// Farthest that one was off the line between its neighbours, rad/s (of a force m/s^2).
     pub largest: f64,
 }
 
 impl SpikeCount {
-    /// Adds a sample that was so far off.
-    fn add(&mut self, at: Nanos, off: &Vector3<f64>) {
-        self.samples += 1;
+    /// Adds samples that were so far off.
+    fn add(&mut self, at: Nanos, samples: usize, off: f64) {
+        self.samples += samples as u64;
         self.first.get_or_insert(at);
-        self.largest = self.largest.max(off.norm());
+        self.largest = self.largest.max(off);
     }
 }
 
@@ -55,6 +57,10 @@ const ANY: f64 = 6.0;
 const ONE_SIDE: f64 = 0.7;
 /// Steps of the specific force that are quiet, m/s^2, beyond twice the ordinary ones.
 const QUIET_FORCE: f64 = 0.5;
+/// Distance of a force, in times of what is ordinary about it, that is a glitch of the accelerometer.
+const ALONE_FORCE: f64 = 6.0;
+/// Bend of the rate that is no blow, rad/s, beyond twice the ordinary one.
+const QUIET_RATE: f64 = 0.05;
 /// Steps of quantisation that a spike exceeds.
 const QUANTA: f64 = 4.0;
 /// Change that is a spike after readings that never differed, rad/s: their quantisation is not known.
@@ -67,6 +73,19 @@ pub(super) struct Spikes {
     /// The rest of a run that is being replaced: place in the stream, and the line's value.
     run: [Option<(u64, Vector3<f64>)>; LONGEST - 1],
     drops_force: bool,
+    /// Samples that are left of a run of wrong forces, and how far these are off, m/s^2.
+    wrong_forces: (usize, f64),
+}
+
+/// Samples that a spike has at most.
+fn most(spacing: i64) -> usize {
+    (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize
+}
+
+/// Whether a run of so many samples, and the one behind, have no hole in them.
+fn is_whole(span: i64, samples: usize, spacing: i64, coarse: Option<i64>) -> bool {
+    let longest = LONGEST_SPAN * (samples as i64 + 1) * spacing;
+    (0..=longest.saturating_add(coarse.unwrap_or(0))).contains(&span)
 }
 
 fn is_rate(settings: &Settings) -> bool {
@@ -132,6 +151,7 @@ impl Spikes {
             },
             run: [None; LONGEST - 1],
             drops_force: false,
+            wrong_forces: (0, 0.0),
         }
     }
 
@@ -143,15 +163,22 @@ impl Spikes {
         entry: &Entry,
         ahead: &[Entry],
         (spacing, coarse): (Option<i64>, Option<i64>),
-        count: &mut SpikeCount,
+        report: &mut Report,
     ) -> Option<Entry> {
         let value = self.judged(entry, ahead, spacing, coarse);
         let Some(value) = value else {
-            self.past.push(entry, &entry.value);
-            return None;
+            let Some((without, off)) = self.without_force(entry, ahead, (spacing, coarse), report)
+            else {
+                self.past.push(entry, &entry.value);
+                return None;
+            };
+            self.past.push_without_force(&without, off);
+            return Some(without);
         };
         self.past.push(entry, &value);
-        count.add(entry.stamp, &(entry.value - value));
+        report
+            .spikes
+            .add(entry.stamp, 1, (entry.value - value).norm());
         let status = Status(entry.status.0 & !Status::SATURATED.0);
         Some(Entry {
             value,
@@ -161,6 +188,48 @@ impl Spikes {
             },
             status: status.with(Status::REPAIRED),
             ..*entry
+        })
+    }
+
+    /// The entry without its force, where that is a glitch of the accelerometer alone.
+    #[inline]
+    fn without_force(
+        &mut self,
+        entry: &Entry,
+        ahead: &[Entry],
+        (spacing, coarse): (Option<i64>, Option<i64>),
+        report: &mut Report,
+    ) -> Option<(Entry, f64)> {
+        if self.wrong_forces.0 == 0 && !self.past.may_be_force(entry) {
+            return None;
+        }
+        if self.wrong_forces.0 == 0 {
+            let spacing = spacing.filter(|step| (1..=LONGEST_STEP_NANOS).contains(step))?;
+            let (samples, off) = self.wrong_forces(entry, ahead, spacing, coarse)?;
+            self.wrong_forces = (samples, off);
+            report.force_spikes.add(entry.stamp, samples, off);
+        }
+        self.wrong_forces.0 -= 1;
+        let accel = NO_ACCEL;
+        Some((Entry { accel, ..*entry }, self.wrong_forces.1))
+    }
+
+    /// Samples from this one on whose forces are a glitch, and how far they are off, m/s^2.
+    #[cold]
+    fn wrong_forces(
+        &self,
+        entry: &Entry,
+        ahead: &[Entry],
+        spacing: i64,
+        coarse: Option<i64>,
+    ) -> Option<(usize, f64)> {
+        if self.past.count <= PAST {
+            return None;
+        }
+        (1..=most(spacing)).find_map(|samples| {
+            let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
+            let off = self.past.force_off(entry, ahead, samples)?;
+            is_whole(span, samples, spacing, coarse).then_some((samples, off))
         })
     }
 
@@ -182,8 +251,7 @@ impl Spikes {
         if self.past.count <= PAST {
             return None;
         }
-        let most = (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize;
-        (1..=most).find_map(|samples| {
+        (1..=most(spacing)).find_map(|samples| {
             let run = self.run_of(entry, ahead, samples, spacing, coarse)?;
             let weight = self.weight(&run, entry, ahead);
             weight.is_spike().then(|| self.begin(&run, &weight, ahead))
@@ -202,10 +270,7 @@ impl Spikes {
     ) -> Option<Run> {
         let run = Run::of(&self.past.rates[0], entry, ahead, samples)?;
         let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
-        let longest = LONGEST_SPAN * (samples as i64 + 1) * spacing;
-        (0..=longest.saturating_add(coarse.unwrap_or(0)))
-            .contains(&span)
-            .then_some(run)
+        is_whole(span, samples, spacing, coarse).then_some(run)
     }
 
     /// Evidence for a spike, by the samples in `ahead`.

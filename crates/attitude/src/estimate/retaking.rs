@@ -269,7 +269,8 @@ impl Retaking {
             Revision::Sound(count) => self.settle(stages, count, None),
             Revision::Repaired(samples) => {
                 if self.doubted.is_none() {
-                    return samples.len() as u64;
+                    let is_spike = |rate: &&RateSample| rate.status.has(Status::REPAIRED);
+                    return samples.iter().filter(is_spike).count() as u64;
                 }
                 self.settle(stages, samples.len(), Some(&samples));
                 self.go_back(stages);

@@ -126,6 +126,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     out.extend(stream::find(noted.conditioning, false));
     out.extend(saturated(noted.conditioning));
     out.extend(spikes(noted.conditioning));
+    out.extend(force_spikes(noted.conditioning));
     if let Some(references) = noted.references.filter(|_| summary.against.is_empty()) {
         out.push(no_reference(references));
     }
@@ -159,6 +160,7 @@ pub fn of_sensor(report: &Report, propagation: &propagate::Report, clock: &str) 
     out.extend(batches.map(|said| Finding::said(Severity::Warning, "batches", &said)));
     out.extend(saturated(report));
     out.extend(spikes(report));
+    out.extend(force_spikes(report));
     out.extend(spikes_left(report));
     out.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     out
@@ -374,6 +376,26 @@ fn spikes_of((samples, largest): (u64, f64), done: &str) -> Option<Finding> {
         )
         .with("count", samples)
         .with("largest_rad_s", largest)
+    })
+}
+
+/// Forces that nothing around them agrees with, and of which the gyro felt nothing.
+fn force_spikes(report: &Report) -> Option<Finding> {
+    let found = report.force_spikes;
+    let at = found.first.zip(report.first);
+    let at = at.map_or(0.0, |(spike, first)| spike.secs_since(first));
+    let (samples, shown) = (found.samples, significant(found.largest, 3));
+    (samples > 0).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "accel-spikes",
+            format!("{samples} spikes of the accelerometer, up to {shown} m/s^2, first {at:.3} s after the start: left out"),
+        )
+        .with("count", samples)
+        .with("largest_m_s2", found.largest)
+        .with("first_at_s", at)
+        .advise("the gyro felt nothing of them; to leave them as recorded")
+        .help([SPIKES.to("keep")])
     })
 }
 

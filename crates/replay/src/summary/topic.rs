@@ -96,6 +96,8 @@ pub struct TopicSummary {
     pub truncation_step: Option<f64>,
     /// Samples of the gyro that were spikes and were repaired.
     pub spikes: u64,
+    /// Samples whose force was a glitch of the accelerometer alone and was left out.
+    pub force_spikes: u64,
     /// Account of what corrected the attitude, if something did.
     pub aided: Option<FilterSummary>,
     /// Result of a smoother, if one was asked for, or why there is none: then the attitude is that of `aided`.
@@ -185,6 +187,7 @@ impl TopicSummary {
             bias_origin: prepared.bias_origin.clone(),
             truncation_step: prepared.truncation_step,
             spikes: conditioning.spikes.samples,
+            force_spikes: conditioning.force_spikes.samples,
             aided: estimator.filter().map(FilterSummary::of),
             smoothed,
             calibration: learned((plan, resolved, prepared), estimator.filter(), recording),
@@ -284,6 +287,7 @@ impl TopicSummary {
             Row::value("bias_sigma_rad_s", self.bias_sigma.as_slice()),
             Row::value("truncation_step_rad_s", self.truncation_step),
             Row::value("repaired_spikes", self.spikes),
+            Row::value("forces_left_out", self.force_spikes),
             Row::value("earth_rate", self.latitude_deg.map(earth_json))
                 .told("earth", self.latitude_deg.map(earth_text).and_then(seen)),
             Row::angle("turned_deg", self.turned).told("turned", seen(self.turned_text())),

@@ -5,10 +5,10 @@
 //! at most the step, and exceeds four times what is ordinary), and ends when the rule has all it needs: one to four
 //! samples later. What integrates keeps its state from the one to the other.
 
-use super::super::gate::Entry;
+use super::super::gate::{Entry, NO_ACCEL};
 use super::super::report::Report;
 use super::super::timing::Timing;
-use super::{FLOOR, LONGEST, LONGEST_NANOS, LONGEST_STEP_NANOS, PAST, QUIET, Run, Spikes, is_rate};
+use super::{FLOOR, LONGEST, LONGEST_STEP_NANOS, PAST, QUIET, Run, Spikes, is_rate, most};
 use crate::condition::{Settings, SpikePolicy};
 use crate::record::{RateSample, Status};
 
@@ -52,6 +52,8 @@ enum Judgement {
     /// Samples behind it are still needed.
     Open,
     Spike(Run, bool),
+    /// The forces of so many samples are a glitch, so far off, m/s^2.
+    WrongForces(usize, f64),
 }
 
 impl Passed {
@@ -101,10 +103,14 @@ impl Passed {
     fn is_suspect(&self, entry: &Entry, spacing: Option<i64>) -> bool {
         let past = &self.spikes.past;
         let step = (entry.value - past.rates[0]).norm_squared();
-        if step <= QUIET * QUIET * FLOOR * FLOOR || past.count <= PAST {
+        let may_be_force = past.may_be_force(entry);
+        if (step <= QUIET * QUIET * FLOOR * FLOOR && !may_be_force) || past.count <= PAST {
             return false;
         }
         let has_step = spacing.is_some_and(|step| (1..=LONGEST_STEP_NANOS).contains(&step));
+        if may_be_force {
+            return has_step;
+        }
         let ordinary = QUIET * (past.ordinary().0 + FLOOR);
         has_step && step > ordinary * ordinary
     }
@@ -146,6 +152,15 @@ impl Passed {
                     self.spikes.past.push(&first, &first.value);
                     (1, Revision::Sound(1))
                 }
+                Judgement::WrongForces(samples, off) => {
+                    if self.revisions.is_some() {
+                        report.force_spikes.add(first.stamp, samples, off);
+                    }
+                    (
+                        samples,
+                        Revision::Repaired(self.without_force(samples, off)),
+                    )
+                }
                 Judgement::Spike(run, drops_force) => {
                     let repaired = self.repaired(&run, drops_force, timing, report);
                     (run.samples, Revision::Repaired(repaired))
@@ -170,8 +185,7 @@ impl Passed {
             *slot = *entry;
         }
         let ahead = ahead.get(..behind.len()).unwrap_or(&ahead);
-        let most = (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize;
-        for samples in 1..=most {
+        for samples in 1..=most(spacing) {
             if ahead.len() < samples {
                 return Judgement::Open;
             }
@@ -190,7 +204,27 @@ impl Passed {
                 return Judgement::Spike(run, weight.drops_force);
             }
         }
-        Judgement::Sound
+        let coarse = timing.coarse();
+        match self.spikes.wrong_forces(first, ahead, spacing, coarse) {
+            Some((samples, off)) => Judgement::WrongForces(samples, off),
+            None => Judgement::Sound,
+        }
+    }
+
+    /// So many samples, which are the oldest, without their forces.
+    fn without_force(&mut self, samples: usize, off: f64) -> Vec<RateSample> {
+        let mut without = Vec::new();
+        for (entry, sample) in self.waiting.iter().take(samples) {
+            let accel = NO_ACCEL;
+            self.spikes
+                .past
+                .push_without_force(&Entry { accel, ..*entry }, off);
+            without.push(RateSample {
+                accel: None,
+                ..*sample
+            });
+        }
+        without
     }
 
     /// The samples of `run`, which are the oldest, as they should have left.
@@ -209,7 +243,7 @@ impl Passed {
         for (n, (entry, sample)) in self.waiting.iter().take(run.samples).enumerate() {
             let value = run.line(n);
             self.spikes.past.push(entry, &value);
-            count.add(entry.stamp, &(entry.value - value));
+            count.add(entry.stamp, 1, (entry.value - value).norm());
             let status = Status(sample.status.0 & !Status::SATURATED.0);
             repaired.push(RateSample {
                 gyro: timing.revalued(sample, &Entry { value, ..*entry }),

@@ -159,6 +159,59 @@ fn a_blow_that_the_accelerometer_feels_is_kept_and_a_glitch_of_the_whole_bus_is_
     assert!(out[2000].accel.is_none() && out[2001].accel.is_some());
 }
 
+/// Places of the samples without a force.
+fn without_force(out: &[RateSample]) -> Vec<usize> {
+    let found = out.iter().enumerate().filter(|(_, s)| s.accel.is_none());
+    found.map(|(n, _)| n).collect()
+}
+
+#[test]
+fn a_glitch_of_the_accelerometer_alone_is_left_out_and_a_blow_is_not() {
+    let clean = hand(20, 400);
+    let at = [2000, 2500, 2501, 3001, 4444, 6000, 6001, 6002];
+    let mut raw = clean.clone();
+    for n in at {
+        raw[n].accel = raw[n].accel.map(|[x, y, z]| [x + 78.0, y, z - 40.0]);
+    }
+    let (out, report) = conditioned(&Settings::default(), &raw, 33);
+    assert_eq!(without_force(&out), at);
+    assert_eq!((report.force_spikes.samples, report.spikes.samples), (8, 0));
+    assert_eq!(report.force_spikes.first, raw[2000].header);
+    assert!(
+        (report.force_spikes.largest - 87.7).abs() < 0.5,
+        "{report:?}"
+    );
+    // Rates, stamps and marks are as they were.
+    let of = |raw: &[RawSample]| conditioned(&Settings::default(), raw, 33).0;
+    for (found, clean) in out.iter().zip(of(&clean)) {
+        assert_eq!((found.gyro, found.status), (clean.gyro, clean.status));
+    }
+    // Longer than 12 ms; felt by the gyro; one of many, but for the first; a step that stays.
+    for (n, sample) in raw.iter_mut().enumerate() {
+        *sample = clean[n];
+        let hit = match n {
+            2000..2008 => 60.0,
+            3000 => 40.0,
+            4000..4100 => 50.0 * (n % 2) as f64,
+            6000.. => 20.0,
+            _ => 0.0,
+        };
+        sample.accel = sample.accel.map(|[x, y, z]| [x, y + hit, z]);
+        if n == 3000 {
+            add(sample, 0, 0.2);
+        }
+    }
+    let (out, report) = conditioned(&Settings::default(), &raw, 33);
+    assert_eq!(without_force(&out), [4001], "{report:?}");
+    let keep = Settings {
+        spikes: SpikePolicy::Keep,
+        ..Settings::default()
+    };
+    raw = clean;
+    raw[2000].accel = Some([78.0, 0.0, 0.0]);
+    assert_eq!(without_force(&conditioned(&keep, &raw, 33).0), [0; 0]);
+}
+
 #[test]
 fn spikes_are_the_same_however_samples_come_and_left_where_that_is_asked_or_nothing_waits() {
     let mut raw = hand(10, 100);

@@ -125,6 +125,28 @@ fn from_the_sample_behind_a_spike_on_attitudes_are_those_of_a_repaired_recording
 }
 
 #[test]
+fn a_force_that_is_a_glitch_is_taken_back() {
+    let at = [300, 900, 901, 1700, 2600];
+    let (mut raw, mut without) = (hand(20, HZ), hand(20, HZ));
+    for n in at {
+        raw[n].accel = raw[n].accel.map(|[x, y, z]| [x + 78.0, y - 30.0, z]);
+        without[n].accel = None;
+    }
+    let of = |raw: &[RawSample], spikes| run(&plan(Aid::Gravity, SampleKind::Rate, spikes), raw);
+    let (expected, _) = of(&without, SpikePolicy::Keep);
+    let (kept, _) = of(&raw, SpikePolicy::Keep);
+    let (found, estimator) = of(&raw, SpikePolicy::Repair);
+    assert_eq!(estimator.conditioning().force_spikes.samples, 5);
+    assert_eq!(estimator.conditioning().spikes.samples, 0);
+    let worst = |of: &[AttitudeSample]| {
+        let last = of.iter().zip(&expected).skip(2700);
+        last.map(|(a, b)| apart(a, b)).fold(0.0, f64::max)
+    };
+    assert!(worst(&kept) > 1e-4, "{}", worst(&kept));
+    assert!(worst(&found) < 1e-9, "{}", worst(&found));
+}
+
+#[test]
 fn attitudes_are_the_same_however_samples_come() {
     let raw = spiked();
     for aid in [Aid::None, Aid::Gravity] {
