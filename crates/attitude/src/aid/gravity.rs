@@ -11,6 +11,14 @@ use nalgebra::Vector3;
 /// Time constant of the mean acceleration that tells a wrong tilt, s.
 const MEAN_SECS: f64 = 2.0;
 
+/// Change of the usual length of gravity, as a share a second; the same in the beginning, times the seconds since.
+const LENGTH_RATE: f64 = 2e-3;
+const LENGTH_START: f64 = 0.02;
+/// Share of the lengths below it over that of those above: a body that travels makes forces longer, never shorter.
+const LENGTH_BELOW: f64 = 0.25;
+/// Farthest that it comes to lie from gravity, as a share.
+const LENGTH_FARTHEST: f64 = 0.1;
+
 /// The mean specific force of an interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Force {
@@ -29,6 +37,7 @@ impl Filter {
         self.state.mean_acceleration +=
             (force.acceleration - self.state.mean_acceleration) * (secs / (MEAN_SECS + secs));
         let gravity = Vector3::z() * self.settings.gravity;
+        self.watch_length((self.state.mean_acceleration + gravity).norm(), secs);
         if self.state.wants_level && self.level(force.acceleration + gravity) {
             self.state.wants_level = false;
             return true;
@@ -36,6 +45,19 @@ impl Filter {
         let mean = self.state.mean_acceleration + gravity;
         // The linear correction has a false equilibrium upside down.
         mean.z < 0.0 && self.level(mean)
+    }
+
+    /// Follows the usual length of the mean force, which a fifth of the lengths are below.
+    fn watch_length(&mut self, length: f64, secs: f64) {
+        let (gravity, usual) = (self.settings.gravity, self.state.usual_length);
+        let far = LENGTH_FARTHEST * gravity;
+        let since = self.state.report.updates.max(1) as f64 * secs;
+        let step = LENGTH_RATE.max(LENGTH_START / since) * secs * gravity;
+        let next = match usual > 0.0 {
+            true => usual + (length - usual).clamp(-step, LENGTH_BELOW * step),
+            false => length,
+        };
+        self.state.usual_length = next.clamp(gravity - far, gravity + far);
     }
 
     /// The measurement of tilt.
@@ -107,17 +129,18 @@ impl Filter {
     }
 
     /// Velocity or position are beyond what a held body has: either the tilt is wrong (the mean specific force
-    /// is as long as gravity), or it really travels. Whether it was levelled.
+    /// is as long as gravity as this accelerometer reads it), or it really travels. Whether it was levelled.
     fn leave_reference(&mut self) -> bool {
         let gravity = self.settings.gravity;
+        let usual = self.state.usual_length;
         let mean = self.state.mean_acceleration;
         let across = mean.x.hypot(mean.y);
         let force = mean + Vector3::z() * gravity;
         let length = force.norm();
-        let of_travel = gravity.hypot(across);
+        let of_travel = usual.hypot(across);
         let is_tilt = across > self.settings.level_force
-            && length > 0.9 * gravity
-            && length < 0.5 * (gravity + of_travel);
+            && length > 0.9 * usual
+            && length < 0.5 * (usual + of_travel);
         if is_tilt && self.level(force) {
             return true;
         }

@@ -73,7 +73,12 @@ impl Memory {
     pub(crate) fn is_plausible(&self) -> bool {
         let Memory { filter, stream } = self;
         let calibration = &filter.calibration;
-        let scalars = [filter.disturbance, filter.since_force, filter.class_log];
+        let scalars = [
+            filter.disturbance,
+            filter.since_force,
+            filter.class_log,
+            filter.usual_length,
+        ];
         let vectors = [&filter.mean_acceleration, &filter.last_rate];
         let unseen = [&filter.last_force, &filter.last_up];
         let mut beside = stream.forces.iter().chain([&stream.fields]);
@@ -263,7 +268,7 @@ mod tests {
         let (propagation, memory) = whole.memory().unwrap();
         let of_filter = "calibration class_log correction covariance disturbance drift fields forces gaps_in_a_row given interval \
                          is_started is_widened last last_force last_out last_rate last_up mean_acceleration nominal \
-                         plausibility position report residuals rest since_force surroundings velocity vertical \
+                         plausibility position report residuals rest since_force surroundings usual_length velocity vertical \
                          wants_level world";
         let of_propagator = "added attitude before covariance excess initial last next now open rates resets samples \
                              sum waiting world_since";

@@ -38,6 +38,9 @@ pub(super) struct State {
     pub(super) rest: Rest,
     pub(super) residuals: Residuals,
     pub(super) mean_acceleration: Vector3<f64>,
+    /// Usual length of the mean force, m/s^2, 0 before the first: gravity as this accelerometer reads it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) usual_length: f64,
     /// The vertical in the interval before, body axes.
     pub(super) last_up: Option<Vector3<f64>>,
     /// Nothing seen in a file that is older than these two fields.

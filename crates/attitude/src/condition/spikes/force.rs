@@ -4,7 +4,7 @@
 //! force of such a sample is left out; its rate stays.
 
 use super::super::gate::{Entry, finite_accel};
-use super::{ALONE_FORCE, PAST, Past, QUIET_FORCE, QUIET_RATE, Run};
+use super::{ALONE_FORCE, LONGEST, PAST, Past, QUIET_FORCE, QUIET_RATE, Run};
 use nalgebra::Vector3;
 
 /// Distance of a force from its neighbours that nobody calls a glitch, m/s^2.
@@ -31,44 +31,36 @@ impl Past {
         }
     }
 
-    /// How far the forces of the `samples` from `entry` on are off the line between their neighbours, m/s^2, where they
+    /// Distance of the forces of the `samples` from `entry` on off the line between their neighbours, m/s^2, where they
     /// are a glitch.
     #[cold]
     pub(super) fn force_off(&self, entry: &Entry, ahead: &[Entry], samples: usize) -> Option<f64> {
-        let before = self.forces[0]?;
         let behind = ahead.get(samples - 1)?;
-        let end = finite_accel(&behind.accel)?;
         if behind.epoch != entry.epoch {
             return None;
         }
-        let run = Run {
+        let line = |ends| Run {
             samples,
-            ends: (before, end),
-            distance: f64::INFINITY,
-        };
-        let rates = Run {
-            samples,
-            ends: (self.rates[0], behind.value),
+            ends,
             distance: 0.0,
         };
-        let (rate, force) = self.ordinary();
-        let (mut distance, mut swings) = (f64::INFINITY, (end - before).norm());
-        let (mut bend, mut mean) = ((behind.value - self.rates[0]).norm(), Vector3::zeros());
+        let forces = line((self.forces[0]?, finite_accel(&behind.accel)?));
+        let rates = line((self.rates[0], behind.value));
+        let apart = |run: &Run| (run.ends.1 - run.ends.0).norm();
+        let (mut off, mut bend) = ([Vector3::zeros(); LONGEST], apart(&rates));
         let within = std::iter::once(entry).chain(ahead).take(samples);
-        for (n, sample) in within.clone().enumerate() {
-            let off = finite_accel(&sample.accel)? - run.line(n);
-            distance = distance.min(off.norm());
-            mean += off;
+        for (n, (off, sample)) in off.iter_mut().zip(within).enumerate() {
+            *off = finite_accel(&sample.accel)? - forces.line(n);
             bend = bend.max((sample.value - rates.line(n)).norm());
         }
-        // Both neighbours agree with what was before them, and with each other.
-        swings += force;
-        let on_one_side = within.enumerate().all(|(n, sample)| {
-            let off = finite_accel(&sample.accel).map(|force| force - run.line(n));
-            off.is_some_and(|off| off.dot(&mean) > 0.0)
-        });
-        let is_alone = distance > LEAST && distance > ALONE_FORCE * (swings + QUIET_FORCE);
+        let off = off.get(..samples)?;
+        let sum = off.iter().sum::<Vector3<f64>>();
+        let distance = off.iter().map(Vector3::norm).fold(f64::INFINITY, f64::min);
+        let (rate, force) = self.ordinary();
         let is_felt = bend > 2.0 * rate + QUIET_RATE;
-        (is_alone && !is_felt && on_one_side).then_some(distance)
+        let is_alone = distance > LEAST
+            && distance > ALONE_FORCE * (apart(&forces) + force + QUIET_FORCE)
+            && off.iter().all(|off| off.dot(&sum) > 0.0);
+        (is_alone && !is_felt).then_some(distance)
     }
 }

@@ -211,7 +211,7 @@ impl Passed {
         }
     }
 
-    /// So many samples, which are the oldest, without their forces.
+    /// Samples that are the oldest, so many, without their forces.
     fn without_force(&mut self, samples: usize, off: f64) -> Vec<RateSample> {
         let mut without = Vec::new();
         for (entry, sample) in self.waiting.iter().take(samples) {
