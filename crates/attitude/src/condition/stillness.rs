@@ -65,6 +65,8 @@ impl Default for Limits {
 const MIN_SAMPLES: u32 = 8;
 /// Shortest rest: "the first still second".
 const MIN_REST_SECS: f64 = 1.0;
+/// Largest change of the force's length from window to window, beyond its noise, as a share.
+const MOST_HEAVE: f64 = 2e-3;
 /// A window may end a little early: the stamps jitter.
 const SLACK: f64 = 0.9;
 
@@ -302,8 +304,17 @@ impl Stillness {
             (Some(a), Some(b)) => a.angle(&b) > self.limits.max_tilt,
             _ => false,
         };
-        self.rests.has_moved |= turned;
-        turned || (window.gyro.mean - growing.last_rate).amax() > allowed
+        // A boat at the turn of its swing: the rate and the direction stand, the force does not.
+        let heaves = match (growing.last_accel, accel) {
+            (Some(a), Some(b)) => {
+                let noise = window.accel.deviation() / f64::from(window.accel.n).sqrt();
+                let allowed = 5.0 * std::f64::consts::SQRT_2 * noise + MOST_HEAVE * b.norm();
+                (b.norm() - a.norm()).abs() > allowed
+            }
+            _ => false,
+        };
+        self.rests.has_moved |= turned || heaves;
+        turned || heaves || (window.gyro.mean - growing.last_rate).amax() > allowed
     }
 
     fn close(&mut self) {

@@ -109,13 +109,16 @@ fn increments_give_the_same_bias_as_rates() {
 
 #[test]
 fn a_body_that_moves_is_refused() {
-    // Swinging, shaking, turning fast, and turning slowly about a level axis.
+    // Swinging, shaking, turning fast, turning slowly about a level axis, and a boat that heaves at the turn of its
+    // swing.
     let swing = |t: f64| Vector3::new(0.2 * (6.0 * t).sin(), 0.0, 0.0);
     let shake = |t: f64| DOWNWARD + Vector3::new(0.0, 2.0 * (50.0 * t).sin(), 0.0);
     let spin = |_: f64| Vector3::new(0.0, 0.0, 0.5);
     let tilt = |_: f64| Vector3::new(0.04, 0.0, 0.0);
     let tilting = |t: f64| Rotation3::from_axis_angle(&Vector3::x_axis(), -0.04 * t) * DOWNWARD;
+    let heave = |t: f64| DOWNWARD * (1.0 + 0.15 * (0.6 * t).sin());
     for (name, samples) in [
+        ("heave", body(5, 2.4, still, heave)),
         ("swing", body(1, 10.0, swing, upright)),
         ("shake", body(2, 10.0, still, shake)),
         ("spin", body(3, 10.0, spin, upright)),
