@@ -60,7 +60,7 @@ const GATE_BACK: usize = 3;
 const REFINED_BY: usize = 32;
 /// Segments in a row for which a verdict holds before it is said.
 const HOLD: usize = 3;
-/// Maps beyond the bank are looked for after so many segments, after twice as many, and so on; and at the end.
+/// Maps beyond the bank are looked for after so many segments of a live stream, after twice as many, and so on.
 const FINER_FIRST: usize = 8;
 /// Least segments for that at the end, and their median scatter as recorded, g, where the bank was never opened.
 const FINER_LEAST: usize = 4;
@@ -392,7 +392,13 @@ impl Consistency {
             self.settled = verdict;
         }
         self.judged += 1;
-        if self.judged >= FINER_FIRST && self.judged.is_power_of_two() {
+        // The end of a recording judges all that is kept, which until then is all there was.
+        let first = if self.is_live {
+            FINER_FIRST
+        } else {
+            REFINED_BY
+        };
+        if self.judged >= first && self.judged.is_power_of_two() {
             let segments: Vec<&Segment> = self.kept.iter().collect();
             let known = self.finer.filter(|finer| finer.holds(&segments));
             self.finer = finer::finer(&segments, self.settled.as_ref()).or(known);

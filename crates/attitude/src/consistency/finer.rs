@@ -18,6 +18,10 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 const WELL: f64 = 0.01;
 /// Scatter of gravity that is better than another, as a share of it.
 const BETTER: f64 = 0.6;
+/// Median scatter as recorded, g, from which units with other axes are tried.
+const LEAST_OF_UNITS: f64 = 0.12;
+/// Segments by which a beginning is chosen.
+const BEGUN_BY: usize = 8;
 /// Segments by which units with other axes are tried, the last ones.
 const TRIED_BY: usize = 16;
 /// Segments after which a unit of which no map says so much is given up.
@@ -117,7 +121,11 @@ pub(super) fn finer(segments: &[&Segment], settled: Option<&Verdict>) -> Option<
         return None;
     }
     let is_better = |finer: &Finer| known.is_none_or(|known| finer.found <= BETTER * known);
-    let of_axes = units_with_axes(segments).filter(is_better);
+    let mut recorded = scatters(segments, &Matrix3::identity())?;
+    // Another unit leaves nothing of gravity, other axes wander far: what is moved about hard has less.
+    let is_far = median(&mut recorded).sqrt() >= LEAST_OF_UNITS;
+    let of_axes = is_far.then(|| units_with_axes(segments)).flatten();
+    let of_axes = of_axes.filter(is_better);
     let found = of_axes
         .into_iter()
         .chain(refined(segments).filter(is_better));
@@ -277,7 +285,8 @@ impl Judged {
                 let found = segment.scatter::<3>(map, &[], &Vector3::zeros());
                 (found.s + FLOOR).ln()
             };
-            segments.iter().map(scatter).sum()
+            let every = segments.len().div_ceil(BEGUN_BY).max(1);
+            segments.iter().step_by(every).map(scatter).sum()
         };
         let by_total =
             |some: &(f64, Matrix3<f64>), other: &(f64, Matrix3<f64>)| some.0.total_cmp(&other.0);
