@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 /// Time constant of the mean acceleration that tells a wrong tilt, s.
 const MEAN_SECS: f64 = 2.0;
 
-/// Change of the usual length of gravity, as a share a second; the same in the beginning, times the seconds since.
+/// Change of the usual length of gravity, as a share a second; the share in an update, times those since the beginning.
 const LENGTH_RATE: f64 = 2e-3;
 const LENGTH_START: f64 = 0.02;
 /// Share of the lengths below it over that of those above: a body that travels makes forces longer, never shorter.
@@ -51,8 +51,8 @@ impl Filter {
     fn watch_length(&mut self, length: f64, secs: f64) {
         let (gravity, usual) = (self.settings.gravity, self.state.usual_length);
         let far = LENGTH_FARTHEST * gravity;
-        let since = self.state.report.updates.max(1) as f64 * secs;
-        let step = LENGTH_RATE.max(LENGTH_START / since) * secs * gravity;
+        let updates = self.state.report.updates.max(1) as f64;
+        let step = (LENGTH_RATE * secs).max(LENGTH_START / updates) * gravity;
         let next = match usual > 0.0 {
             true => usual + (length - usual).clamp(-step, LENGTH_BELOW * step),
             false => length,

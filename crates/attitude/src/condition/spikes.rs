@@ -57,10 +57,6 @@ const ANY: f64 = 6.0;
 const ONE_SIDE: f64 = 0.7;
 /// Steps of the specific force that are quiet, m/s^2, beyond twice the ordinary ones.
 const QUIET_FORCE: f64 = 0.5;
-/// Distance of a force, in times of what is ordinary about it, that is a glitch of the accelerometer.
-const ALONE_FORCE: f64 = 6.0;
-/// Bend of the rate that is no blow, rad/s, beyond twice the ordinary one.
-const QUIET_RATE: f64 = 0.05;
 /// Steps of quantisation that a spike exceeds.
 const QUANTA: f64 = 4.0;
 /// Change that is a spike after readings that never differed, rad/s: their quantisation is not known.

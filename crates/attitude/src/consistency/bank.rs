@@ -30,8 +30,8 @@ pub const CHIPS: [(f64, u32); 8] = [
 ];
 /// Factors that units and ranges make, beside the counts of chips: a hand turns ten rad in a segment, of which the 12 %
 /// between two powers leave nothing that stands still.
-pub(super) const UNITS: [f64; 5] = [DEGREE, 1.0 / DEGREE, 1e-3, 0.5, 2.0];
-pub(super) const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const UNITS: [f64; 5] = [DEGREE, 1.0 / DEGREE, 1e-3, 0.5, 2.0];
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Hypotheses in the bank.
 const HYPOTHESES: usize = MAPS + 51 + UNITS.len() + CHIPS.len();
 /// Least mean force of what stands still, g: rates of any other size turn gravity until nothing of it is left, and
@@ -81,6 +81,12 @@ pub(super) struct Hypothesis {
 /// The bank: maps, then factors, of which the first stands for no rotation at all.
 pub(super) static BANK: LazyLock<Vec<Hypothesis>> = LazyLock::new(bank);
 
+/// Factors of units, ranges and chips.
+pub(super) fn units() -> impl Iterator<Item = f64> {
+    let chips = CHIPS.map(|(counts, _)| DEGREE / counts);
+    UNITS.into_iter().chain(chips)
+}
+
 fn bank() -> Vec<Hypothesis> {
     let signs = [1.0, -1.0];
     let mut maps = Vec::with_capacity(HYPOTHESES);
@@ -119,8 +125,7 @@ fn bank() -> Vec<Hypothesis> {
             true => NOTHING,
             false => RATIO.powi(k),
         });
-    let chips = CHIPS.map(|(counts, _)| DEGREE / counts);
-    maps.extend(powers.chain(UNITS).chain(chips).map(|factor| Hypothesis {
+    maps.extend(powers.chain(units()).map(|factor| Hypothesis {
         map: Matrix3::from_diagonal_element(factor),
         factor: Some(factor),
         cost: 1.5 + 0.5 * factor.ln().abs(),

@@ -4,8 +4,8 @@
 //! A stage of its own because it is dear and seldom: it is asked only where gravity wanders and the bank has no answer.
 
 use super::bank::{
-    self, Answer, BANK, CHIPS, Evidence, FLOOR, LEAST_GRAVITY, LEAST_IDENTITY_LESS, LEAST_SHARE,
-    MAPS, UNITS, Verdict, evidence,
+    Answer, BANK, Evidence, FLOOR, LEAST_GRAVITY, LEAST_IDENTITY_LESS, LEAST_SHARE, MAPS, Verdict,
+    evidence, units,
 };
 use super::refine::refine;
 use super::segment::Segment;
@@ -121,23 +121,29 @@ pub(super) fn finer(segments: &[&Segment], settled: Option<&Verdict>) -> Option<
         return None;
     }
     let is_better = |finer: &Finer| known.is_none_or(|known| finer.found <= BETTER * known);
-    let mut recorded = scatters(segments, &Matrix3::identity())?;
+    let recorded = scatters(segments, &Matrix3::identity())?;
+    let wanders = wanders(&recorded);
     // Another unit leaves nothing of gravity, other axes wander far: what is moved about hard has less.
-    let is_far = median(&mut recorded).sqrt() >= LEAST_OF_UNITS;
-    let of_axes = is_far.then(|| units_with_axes(segments)).flatten();
+    let is_far = wanders >= LEAST_OF_UNITS;
+    let of_axes = is_far.then(|| units_with_axes(segments, wanders)).flatten();
     let of_axes = of_axes.filter(is_better);
     let found = of_axes
         .into_iter()
-        .chain(refined(segments).filter(is_better));
+        .chain(refined(segments, &recorded).filter(is_better));
     found.min_by(|some, other| some.found.total_cmp(&other.found))
 }
 
 /// The map near the recorded one that explains these segments, whose median scatter is at least so much, g.
 pub(super) fn nearby(segments: &[&Segment], least: f64) -> Option<Finer> {
-    let mut recorded = scatters(segments, &Matrix3::identity())?;
-    (median(&mut recorded).sqrt() >= least)
-        .then(|| refined(segments))
+    let recorded = scatters(segments, &Matrix3::identity())?;
+    (wanders(&recorded) >= least)
+        .then(|| refined(segments, &recorded))
         .flatten()
+}
+
+/// Median scatter, g.
+fn wanders(squares: &[f64]) -> f64 {
+    median(&mut squares.to_vec()).sqrt()
 }
 
 /// Scatter of gravity in these segments under what the bank has settled on, g.
@@ -151,11 +157,11 @@ fn explained(segments: &[&Segment], settled: &Verdict) -> Option<f64> {
     }
 }
 
-/// Units and ranges with the maps of the bank, each judged as the bank judges the unit it is given.
-fn units_with_axes(segments: &[&Segment]) -> Option<Finer> {
+/// Units and ranges with the maps of the bank, each judged as the bank judges the unit it is given; `recorded`: the median
+/// scatter as recorded, g.
+fn units_with_axes(segments: &[&Segment], recorded: f64) -> Option<Finer> {
     let last = &segments[segments.len().saturating_sub(TRIED_BY)..];
-    let chips = CHIPS.map(|(counts, _)| bank::DEGREE / counts);
-    let judged = UNITS.into_iter().chain(chips).filter_map(|unit| {
+    let judged = units().filter_map(|unit| {
         let mut evidence = Evidence::of(MAPS + 1);
         for (n, segment) in last.iter().enumerate() {
             if n == SOON && evidence.most() < LEAST_SOON {
@@ -177,7 +183,6 @@ fn units_with_axes(segments: &[&Segment]) -> Option<Finer> {
     let found = refine::<4>(of(), &start, &[Matrix3::identity()])?;
     let factor = found.map.norm() / axes.norm();
     let sigma = found.sigma[3] * unit / factor;
-    let mut recorded = scatters(segments, &Matrix3::identity())?;
     let is_sound = sigma.is_finite() && found.left < LARGEST_FOUND.max(verdict.found);
     is_sound.then_some(Finer {
         kind: Kind::UnitAndAxes {
@@ -186,15 +191,14 @@ fn units_with_axes(segments: &[&Segment]) -> Option<Finer> {
         },
         map: axes * factor,
         sigma,
-        recorded: median(&mut recorded).sqrt(),
+        recorded,
         found: found.left,
         segments: verdict.segments,
     })
 }
 
-/// The simplest refined map that says about the most.
-fn refined(segments: &[&Segment]) -> Option<Finer> {
-    let reference = scatters(segments, &Matrix3::identity())?;
+/// The simplest refined map that says about the most; `recorded`: the scatter of each segment as recorded, g^2.
+fn refined(segments: &[&Segment], recorded: &[f64]) -> Option<Finer> {
     let near = [Matrix3::identity()];
     let unit = |axis: usize| Vector3::ith(axis, 1.0);
     let factors = FACTORS.map(|x| FACTORS.map(|y| FACTORS.map(|z| Vector3::new(x, y, z))));
@@ -209,7 +213,7 @@ fn refined(segments: &[&Segment]) -> Option<Finer> {
     let single = Judged::of::<6>(segments, &axes, &single, None);
     let best = [all, turned, single].map(|judged| {
         let judged = judged?;
-        let told = judged.against(&reference)?;
+        let told = judged.against(recorded)?;
         Some((judged, told))
     });
     let most = best.iter().flatten().map(|(_, told)| told.evidence);

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Largest errors a sensor can have, each element: rad/s, shares, m/s^2, s, the field's unit.
 const BIAS: f64 = 10.0;
-pub(super) const SHARE: f64 = 0.3;
+pub(super) const SHARE: f64 = SensorCalibration::LARGEST_SHARE;
 pub(super) const FORCE_BIAS: f64 = 100.0;
 pub(super) const LEAD: f64 = 0.5;
 pub(super) const FIELD: f64 = 1e6;
@@ -102,6 +102,9 @@ pub struct SensorCalibration {
 }
 
 impl SensorCalibration {
+    /// Largest entry of a matrix: of 1, or rad.
+    pub const LARGEST_SHARE: f64 = 0.3;
+
     /// Checks that a sensor can be like this.
     ///
     /// # Errors

@@ -5,8 +5,8 @@ use crate::field_watch::Saturated;
 use crate::summary::aid::Frozen;
 use crate::summary::clocks::{clock_was_set, counter_wraps};
 use crate::summary::{Gaps, TopicSummary, significant};
-use strapd_attitude::condition::Report;
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
+use strapd_attitude::condition::{Report, SpikeCount};
 use strapd_attitude::consistency::{Consistency, FieldConsistency};
 use strapd_attitude::estimate::{EstimationSettings, Meaning, batches_message};
 use strapd_attitude::propagate;
@@ -135,9 +135,10 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         stream::axes_changed(gyro, plan, noted.conditioning.first, false)
     });
     let disagrees = || noted.gyro.and_then(sensors::disagreement);
-    out.extend(changed.or_else(disagrees));
+    let of_gyro = changed.or_else(disagrees);
     // A gyro that is wrong against gravity turns against the field, too: the gyro is cured first.
-    let is_gyro_sound = noted.gyro.is_none_or(|(gyro, ..)| gyro.agrees());
+    let is_gyro_sound = of_gyro.is_none() && noted.gyro.is_none_or(|(gyro, ..)| gyro.agrees());
+    out.extend(of_gyro);
     if let Some((field, plan)) = noted.field.filter(|_| is_gyro_sound) {
         out.extend(magnetometer::finding(field, plan));
     }
@@ -358,8 +359,7 @@ fn saturated(report: &Report) -> Option<Finding> {
 /// Readings of the gyro that nothing around them agrees with.
 fn spikes(report: &Report) -> Option<Finding> {
     let found = report.spikes;
-    let at = found.first.zip(report.first);
-    let at = at.map_or(0.0, |(spike, first)| spike.secs_since(first));
+    let at = first_at(report, &found);
     let done = format!(", first {at:.3} s after the start: repaired");
     let finding = spikes_of((found.samples, found.largest), &done)?.with("first_at_s", at);
     let advice = "each was replaced by the line between its neighbours; to leave them as recorded";
@@ -379,11 +379,16 @@ fn spikes_of((samples, largest): (u64, f64), done: &str) -> Option<Finding> {
     })
 }
 
+/// Time of the first spike since the start, s.
+fn first_at(report: &Report, found: &SpikeCount) -> f64 {
+    let both = found.first.zip(report.first);
+    both.map_or(0.0, |(spike, first)| spike.secs_since(first))
+}
+
 /// Forces that nothing around them agrees with, and of which the gyro felt nothing.
 fn force_spikes(report: &Report) -> Option<Finding> {
     let found = report.force_spikes;
-    let at = found.first.zip(report.first);
-    let at = at.map_or(0.0, |(spike, first)| spike.secs_since(first));
+    let at = first_at(report, &found);
     let (samples, shown) = (found.samples, significant(found.largest, 3));
     (samples > 0).then(|| {
         Finding::new(

@@ -8,7 +8,7 @@ use crate::summary::significant;
 use nalgebra::Matrix3;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::consistency::{CHIPS, Cause, Consistency, Disagreement};
-use strapd_attitude::estimate::{EstimationSettings, Meaning};
+use strapd_attitude::estimate::{EstimationSettings, Meaning, SensorCalibration};
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 
@@ -25,11 +25,9 @@ const KNOWN: f64 = 0.05;
 /// A known factor is as far as this from the measured one, in sigmas and as a share; a sigma holds to a factor of four.
 const SIGMAS: f64 = 3.0;
 const NEAR: std::ops::Range<f64> = 0.02..0.06;
-/// The same, and least scatter as recorded, g, of scales of single axes that are certain.
+/// Scatter of gravity under scales of single axes that are certain, by that as recorded, and least of that, g.
 const CLEAR: f64 = 0.3;
 const CLEARLY: f64 = 0.05;
-/// Largest entry of the matrix of a calibration file.
-const LARGEST_IN_FILE: f64 = 0.3;
 /// A factor of a single axis that is told.
 const SINGLE: f64 = 0.12;
 /// A factor below this, or above its inverse, is another unit.
@@ -168,7 +166,9 @@ fn of_turn(
         .row_iter()
         .map(|row| format!("[{:.4}, {:.4}, {:.4}]", row[0], row[1], row[2]))
         .collect();
-    let cure = match plan.calibration.is_none() && errors.abs().max() <= LARGEST_IN_FILE {
+    let cure = match plan.calibration.is_none()
+        && errors.abs().max() <= SensorCalibration::LARGEST_SHARE
+    {
         true => format!(
             "a calibration file with `G = [{}]` turns it back",
             rows.join(", ")

@@ -4,11 +4,15 @@
 //! force of such a sample is left out; its rate stays.
 
 use super::super::gate::{Entry, finite_accel};
-use super::{ALONE_FORCE, LONGEST, PAST, Past, QUIET_FORCE, QUIET_RATE, Run};
+use super::{LONGEST, PAST, Past, QUIET_FORCE, Run};
 use nalgebra::Vector3;
 
 /// Distance of a force from its neighbours that nobody calls a glitch, m/s^2.
 const LEAST: f64 = 15.0;
+/// The same in times of what is ordinary about it.
+const ALONE_FORCE: f64 = 6.0;
+/// Bend of the rate that is no blow, rad/s, beyond twice the ordinary one.
+const QUIET_RATE: f64 = 0.05;
 
 impl Past {
     /// Whether a glitch of the force can begin at this entry.
