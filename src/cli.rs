@@ -12,6 +12,7 @@ pub mod compare;
 pub mod config;
 mod continued;
 pub mod estimation;
+pub mod frames;
 pub mod info;
 mod invitation;
 mod known_words;

@@ -3,6 +3,7 @@
 use super::calibration_files;
 use super::continued;
 use super::estimation::Estimation;
+use super::frames::Frames;
 use super::known_words;
 use super::own_output;
 use super::progress::Reporter;
@@ -16,9 +17,9 @@ use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::mounting;
 use crate::pipeline::opening;
 use crate::pipeline::replay;
-use crate::pipeline::request::{FrameNames, ReplayRequest};
+use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
-use crate::sink::{Compression, Encoding, Format, Options, Precision, Target, Transforms};
+use crate::sink::{Compression, Encoding, Format, Options, Precision, Target};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
 use std::io::Write;
@@ -84,13 +85,9 @@ pub struct Replay {
     #[cfg(feature = "parquet")]
     #[arg(long, help_heading = "Output")]
     pub parquet_f32: bool,
-    /// Transforms on /tf of MCAP outputs: from the world to the sensor, from the sensor to the world (where its frame
-    /// has a parent already), or none
-    #[arg(long, value_enum, default_value = "forward", help_heading = "Output")]
-    pub tf: TransformsArg,
-    /// Name of the world's frame in outputs [default: world]
-    #[arg(long, value_name = "NAME", help_heading = "Output")]
-    pub world_frame: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub frames: Frames,
     /// Name of the frame whose attitude is given [default: as the messages say]
     #[arg(long, value_name = "NAME", help_heading = "Output")]
     pub frame_id: Option<String>,
@@ -160,27 +157,6 @@ pub enum EncodingArg {
     Cdr,
     /// `foxglove.FrameTransform`.
     Json,
-}
-
-/// `--tf`.
-#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TransformsArg {
-    /// The world is the parent.
-    Forward,
-    /// The sensor is the parent.
-    Reverse,
-    /// Absence of transforms.
-    None,
-}
-
-impl From<TransformsArg> for Transforms {
-    fn from(given: TransformsArg) -> Transforms {
-        match given {
-            TransformsArg::Forward => Transforms::Forward,
-            TransformsArg::Reverse => Transforms::Reverse,
-            TransformsArg::None => Transforms::None,
-        }
-    }
 }
 
 /// `--compression`.
@@ -479,10 +455,13 @@ impl Replay {
             Source::Stdin => false,
             Source::Elsewhere(_) => true,
         };
+        let body = self.base_frame.as_ref().or(self.frame_id.as_ref());
+        let frames = self.frames.names(body.cloned());
         let served = self.serving.start(
             targets,
             self.speed.as_deref(),
             (&outputs::shown(log), can_rewind, false),
+            &frames,
         )?;
         let run = ReplayRequest {
             source,
@@ -498,15 +477,11 @@ impl Replay {
                 },
                 compression: self.compression.into(),
                 precision: self.precision(),
-                transforms: self.tf.into(),
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
             instants,
-            frames: FrameNames {
-                body: self.base_frame.clone().or_else(|| self.frame_id.clone()),
-                world: self.world_frame.clone(),
-            },
+            frames,
             speed: served.speed,
             against: match (&self.against_recorded, &reference) {
                 (None, Some(_)) => Some(String::new()),

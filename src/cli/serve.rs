@@ -4,6 +4,7 @@ use super::admission::Admission;
 use super::calibration_files::{self, file_of};
 use super::config::Layered;
 use super::estimation::Estimation;
+use super::frames::Frames;
 use super::invitation::{self, Invitation};
 use super::tables::Tables;
 use super::{Global, Outcome, serial, service_manager};
@@ -94,6 +95,9 @@ pub struct Serve {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub frames: Frames,
     /// Record what comes in and the attitudes to this MCAP file
     #[arg(long, value_name = "FILE", help_heading = "Recording")]
     pub record: Option<PathBuf>,
@@ -437,6 +441,7 @@ impl Serve {
                 },
                 plan,
                 plans,
+                frames: self.frames.names(None),
                 limits: Limits {
                     state_window: self.state_window,
                     forget_after: self.forget_after,

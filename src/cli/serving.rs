@@ -11,8 +11,8 @@ use crate::serve::core::hub;
 use crate::serve::playback::controls::Playback;
 use crate::serve::playback::overview::Overview;
 use crate::serve::playback::server::{Next, PlaybackServer};
-use crate::sink::Target;
 use crate::sink::address::Listen;
+use crate::sink::{FrameNames, Target};
 use clap::Args;
 use std::path::Path;
 use std::sync::Arc;
@@ -76,7 +76,7 @@ impl Drop for Looking {
 
 impl Serving {
     /// Starts the server, if a target listens. `speed` is what was given; `source` what is played, whether it can be
-    /// played again, and whether it brings samples beside attitudes.
+    /// played again, and whether it brings samples beside attitudes; `frames` names its frames.
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag; [`Error::Bind`].
@@ -85,6 +85,7 @@ impl Serving {
         mut targets: Vec<Target>,
         speed: Option<&str>,
         (source, can_rewind, brings_samples): (&str, bool, bool),
+        frames: &FrameNames,
     ) -> Result<Served> {
         if let Some(page) = &self.page {
             targets.push(Target::Listen(Listen::parse_from(
@@ -146,6 +147,7 @@ impl Serving {
             let settings = Settings {
                 hub: hub::Settings {
                     brings_samples,
+                    frames: frames.clone(),
                     ..hub::Settings::default()
                 },
                 listen: listen.into_iter().map(Into::into).collect(),

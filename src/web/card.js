@@ -13,6 +13,8 @@ import { writeDoubts, writeHealth, writeNumbers } from "./writing.js";
 
 // Seconds of the path of the z axis.
 const LOCUS = 10;
+// Its curves, from above.
+const PLOTS = ["errors", "angles", "rates", "accelerations"];
 // Milliseconds between two changes of the numbers: faster nobody reads.
 const READABLE = 100;
 
@@ -30,7 +32,7 @@ export class Card {
     this.timeView = view;
     this.place = does.place;
     this.view = { camera: new Camera(), yaw: 0 };
-    this.scales = { rate: new Scale(0.2), angle: new Scale(2), error: new Scale(1e-6) };
+    this.scales = { rate: new Scale(0.2), angle: new Scale(2), error: new Scale(1e-6), acceleration: new Scale(0.1) };
     this.against = null;
     this.element = template.content.firstElementChild.cloneNode(true);
     this.element.dataset.id = this.id;
@@ -69,13 +71,13 @@ export class Card {
   // Once it is on the page, where its canvases have a size.
   placed() {
     const surfaces = {};
-    for (const name of ["body", "horizon", "rates", "angles", "errors", "ellipse"]) {
+    for (const name of ["body", "horizon", ...PLOTS, "ellipse"]) {
       surfaces[name] = new Surface(this.parts[name], this.resized);
     }
     this.surfaces = surfaces;
     steer(this.parts.body, this.view.camera, this.moved);
     const plot = { clock: () => this.sensor.clock, span: () => this.span() };
-    for (const name of ["rates", "angles", "errors"]) this.timeView.attach(this.parts[name], plot);
+    for (const name of PLOTS) this.timeView.attach(this.parts[name], plot);
   }
 
   gone() {
@@ -223,7 +225,7 @@ export class Card {
   }
 
   drawPlots(colours, cursor) {
-    const { sensor, surfaces } = this;
+    const { sensor, surfaces, parts } = this;
     const span = this.span();
     const selected = this.timeView.selection(sensor.clock);
     const strokes = [colours.x, colours.y, colours.z];
@@ -243,6 +245,8 @@ export class Card {
     const compared = this.isWhole() ? track : sensor.history;
     const marks = this.isWhole() ? (this.against.whole?.cuts() ?? []) : [];
     this.marks = marks;
+    parts.accelerationBox.hidden = !track.hasAcceleration;
+    if (track.hasAcceleration) draw("accelerations", track, "acceleration", ["x", "y", "z"], this.scales.acceleration, {});
     if (this.against) draw("errors", compared, "error", ["error"], this.scales.error, { marks });
     this.plotted = { points, width: surfaces.rates.width };
     return at && { ...at, track };
@@ -299,7 +303,7 @@ export class Card {
   // The body in a neutral pose, and no number.
   drawNothing(colours, words) {
     const { surfaces } = this;
-    for (const name of ["rates", "angles", "errors"]) surfaces[name].begin();
+    for (const name of PLOTS) surfaces[name].begin();
     this.drawBody(colours, null);
     this.blank(words);
   }
@@ -312,7 +316,7 @@ export class Card {
     for (const number of this.element.querySelectorAll(".views data, figcaption data, [data-part=seq]")) show(number, NaN, 0);
     for (const name of ["stamp", "flags", "frame", "thinning", "dropped", "held"]) say(parts[name], "");
     for (const name of ["body", "horizon"]) parts[name].setAttribute("aria-label", `${this.name}: ${words}`);
-    for (const name of ["rates", "angles", "errors"]) parts[name].setAttribute("aria-valuetext", words);
+    for (const name of PLOTS) parts[name].setAttribute("aria-valuetext", words);
     this.stale = false;
   }
 

@@ -14,16 +14,19 @@ export class History extends Track {
     this.angle = [0, 1, 2].map(() => new Float32Array(capacity));
     this.sigma = [0, 1, 2].map(() => new Float32Array(capacity));
     this.error = new Float64Array(capacity);
+    // Without gravity, along the world: most sensors have none.
+    this.acceleration = null;
     this.clear();
   }
 
   clear() {
     this.total = 0;
     this.compared = 0;
+    this.acceleration = null;
   }
 
-  // Degrees, and degrees a second.
-  push(time, { seq, q, rate, sigma }, broken) {
+  // Degrees, degrees a second, and m/s^2.
+  push(time, { seq, q, rate, sigma, acceleration }, broken) {
     const slot = this.total % this.capacity;
     this.time[slot] = time;
     this.seq[slot] = seq;
@@ -34,6 +37,10 @@ export class History extends Track {
       this.angle[axis][slot] = angles[axis];
       this.sigma[axis][slot] = sigma[axis];
     }
+    if (acceleration) this.acceleration ??= [0, 1, 2].map(() => new Float32Array(this.capacity).fill(NaN));
+    this.acceleration?.forEach((values, axis) => {
+      values[slot] = acceleration?.[axis] ?? NaN;
+    });
     this.error[slot] = NaN;
     this.broken[slot] = broken ? 1 : 0;
     this.total++;
@@ -45,13 +52,17 @@ export class History extends Track {
     return { w: this.q[at], x: this.q[at + 1], y: this.q[at + 2], z: this.q[at + 3] };
   }
 
+  get hasAcceleration() {
+    return this.acceleration !== null;
+  }
+
   // All that is known of one.
   sample(number) {
     const slot = this.slot(number);
     const of = (values) => values.map((each) => each[slot]);
     return {
       time: this.time[slot], seq: this.seq[slot], q: this.attitude(number), error: this.error[slot],
-      rate: of(this.rate), angle: of(this.angle), sigma: of(this.sigma),
+      rate: of(this.rate), angle: of(this.angle), sigma: of(this.sigma), acceleration: of(this.acceleration ?? []),
     };
   }
 

@@ -4,7 +4,7 @@ import { clockTime, later } from "./clock.js";
 import { say } from "./numbers.js";
 import { FONT } from "./surface.js";
 
-const PICTURE = ["body", "horizon", "rates", "angles", "errors"];
+const PICTURE = ["body", "horizon", "rates", "angles", "errors", "accelerations"];
 
 // A name that every file system takes.
 const named = (id, ending) => `strapd-${id.replace(/[^\w.-]+/g, "_").slice(0, 60) || "sensor"}.${ending}`;
@@ -26,12 +26,13 @@ export function rows({ sensor }, [from, to]) {
   const { clock } = sensor;
   const history = sensor.drawn([from, to]);
   const head = "stamp_s,time_s,seq,q_w,q_x,q_y,q_z,roll_deg,pitch_deg,yaw_deg,rate_x_dps,rate_y_dps,rate_z_dps,sigma_x_deg,sigma_y_deg,sigma_z_deg,error_deg";
-  const lines = [head];
+  const more = history.hasAcceleration ? ",world_linear_acceleration_x,world_linear_acceleration_y,world_linear_acceleration_z" : "";
+  const lines = [head + more];
   const last = history.firstFrom(to + 1e-9);
   for (let n = history.firstFrom(from - 1e-9); n < last; n++) {
-    const { time, seq, q, angle, rate, sigma, error } = history.sample(n);
+    const { time, seq, q, angle, rate, sigma, error, acceleration } = history.sample(n);
     const stamp = later(clock.epoch, time);
-    const values = [time, seq, q.w, q.x, q.y, q.z, ...angle, ...rate, ...sigma, error];
+    const values = [time, seq, q.w, q.x, q.y, q.z, ...angle, ...rate, ...sigma, error, ...(more ? acceleration : [])];
     lines.push([`${stamp.sec}.${padded(stamp.nsec)}`, ...values.map((v) => (Number.isFinite(v) ? v : ""))].join(","));
   }
   return `${lines.join("\n")}\n`;

@@ -102,7 +102,8 @@ export class Sensor {
     this.interrupted = false;
     const degrees = [0, 1, 2].map((axis) => (rate?.[axis] ?? NaN) * DEGREES);
     const sigma = [0, 1, 2].map((axis) => att.sigma_deg?.[axis] ?? NaN);
-    this.history.push(time, { seq: att.seq, q, rate: degrees, sigma }, Boolean(jumped));
+    const acceleration = att.world_linear_acceleration;
+    this.history.push(time, { seq: att.seq, q, rate: degrees, sigma, acceleration }, Boolean(jumped));
     this.last = att;
   }
 

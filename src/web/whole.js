@@ -8,7 +8,7 @@ const number = (value) => value ?? NaN;
 const columns = (rows, from, count) => Array.from({ length: count }, (_, n) => Float64Array.from(rows, (row) => number(row[from + n])));
 
 function grouped(rows) {
-  return { rate: columns(rows, 0, 3), angle: columns(rows, 3, 3), error: columns(rows, 6, 1)[0] };
+  return { rate: columns(rows, 0, 3), angle: columns(rows, 3, 3), error: columns(rows, 6, 1)[0], acceleration: columns(rows, 7, 3) };
 }
 
 export class Whole extends Track {
@@ -27,6 +27,8 @@ export class Whole extends Track {
     this.seq = stream.seq;
     this.count = stream.count;
     Object.assign(this, grouped(stream.first));
+    // Behind the error, where the recording is replayed with it.
+    this.hasAcceleration = stream.first[0]?.length > 7;
     this.low = grouped(stream.low);
     this.high = grouped(stream.high);
     const unknown = new Float64Array(this.total).fill(NaN);
@@ -43,6 +45,7 @@ export class Whole extends Track {
     return {
       time: this.time[n], seq: this.seq[n], q, error: this.error[n],
       rate: this.rate.map((each) => each[n]), angle: rollPitchYaw(q), sigma: [NaN, NaN, NaN],
+      acceleration: this.acceleration.map((each) => each[n]),
     };
   }
 

@@ -87,6 +87,7 @@ function sliders(card, now, angles) {
     rates: `${list(now.rate, ["x", "y", "z"], 2)} degrees a second`,
     angles: `${list(angles, ["roll", "pitch", "yaw"], 1)} degrees`,
     errors: `error ${fixed(now.error, 4)} degrees`,
+    accelerations: `${list(now.acceleration, ["x", "y", "z"], 2)} metres a second squared`,
   };
   for (const [name, text] of Object.entries(words)) {
     const set = (attribute, value) => parts[name].setAttribute(`aria-value${attribute}`, value);

@@ -55,7 +55,7 @@ pub use output::Flow;
 pub use output::{is_named, no_folder, sync_directory};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
-pub use stream::{ChildFrames, Content, Provenance, Stream, output_topic};
+pub use stream::{ChildFrames, Content, FrameNames, Provenance, Stream, output_topic};
 
 pub use target::Target;
 
@@ -75,7 +75,7 @@ const BATCH_SAMPLES: usize = 2048;
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
 
-/// Transforms beside the attitudes of an MCAP.
+/// Transforms beside the attitudes of a stream, in an MCAP and for viewers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Transforms {
     /// Transforms from the world to the sensor: the world is the parent.
@@ -98,8 +98,6 @@ pub struct Options {
     pub compression: Compression,
     /// Numbers of a table in Parquet.
     pub precision: Precision,
-    /// Transforms of an MCAP.
-    pub transforms: Transforms,
 }
 
 /// Account of what a finished sink has written.

@@ -7,7 +7,7 @@ use crate::cli::serving::{Served, Serving};
 use crate::config::numbers;
 use crate::error::{Error, Result};
 use crate::pipeline::simulate::Simulation;
-use crate::sink::{Format, Options, Target};
+use crate::sink::{Format, FrameNames, Options, Target};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -265,9 +265,12 @@ impl Common {
             .map(|o| Target::parse(o))
             .collect::<Result<_>>()?;
         let played = format!("simulate {name}");
-        let served = self
-            .serving
-            .start(targets, self.speed.as_deref(), (&played, true, true))?;
+        let served = self.serving.start(
+            targets,
+            self.speed.as_deref(),
+            (&played, true, true),
+            &FrameNames::default(),
+        )?;
         let simulation = Simulation {
             name: name.to_owned(),
             source,

@@ -180,8 +180,7 @@ impl Channel {
 
     /// Whether one of its channels for viewers has this number.
     pub(in crate::serve) fn has(&self, channel: u32) -> bool {
-        let second = self.stream.content == Content::Truth;
-        channel == self.number || (second && channel == self.number + 1)
+        self.topics().any(|(number, _)| number == channel)
     }
 
     /// The messages of items from number `first_seq` on for a viewer with these subscriptions, by channel.
@@ -195,20 +194,23 @@ impl Channel {
         mut previous: Option<Nanos>,
     ) -> Vec<Chunk> {
         let own = of(self.number);
-        let (beside, is_transform) = match self.stream.content {
-            Content::Attitude => (of(frames::TRANSFORMS), true),
-            Content::Truth => (of(self.number + 1), false),
-            Content::Samples(_) => (None, false),
-        };
-        if own.is_none() && beside.is_none() {
+        let beside = of(self.number + 1).filter(|_| self.has(self.number + 1));
+        let transform = of(frames::TRANSFORMS).filter(|_| self.stream.has_transforms());
+        if own.is_none() && beside.is_none() && transform.is_none() {
             return Vec::new();
         }
         let mut out = Vec::new();
         let push = |out: &mut Vec<u8>, subscription, time, payload: &dyn Fn(&mut Vec<u8>)| {
             if let Some(subscription) = subscription {
                 let from = frames::open(out, subscription, time);
+                let opened = out.len();
                 payload(out);
-                frames::close(out, from);
+                // What is not known of this item is no message.
+                if out.len() == opened {
+                    out.truncate(from);
+                } else {
+                    frames::close(out, from);
+                }
             }
         };
         let mut chunks = Vec::new();
@@ -225,13 +227,15 @@ impl Channel {
                     push(&mut out, own, time, &|out| {
                         self.payloads.attitude(out, item)
                     });
-                    let repeats = previous.replace(item.stamp) == Some(item.stamp);
                     // A repeat of a stamp is what tf2 warns about.
-                    if !(is_transform && repeats) {
-                        push(&mut out, beside, time, &|out| {
-                            self.payloads.beside(out, item)
+                    if previous.replace(item.stamp) != Some(item.stamp) {
+                        push(&mut out, transform, time, &|out| {
+                            self.payloads.transform(out, item)
                         });
                     }
+                    push(&mut out, beside, time, &|out| {
+                        self.payloads.beside(out, item)
+                    });
                 }
                 Items::Samples(items) => {
                     let item = &items[n];

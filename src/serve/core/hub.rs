@@ -53,7 +53,7 @@ use crate::serve::guard::places::Guest;
 use crate::serve::protocol::chunk::Chunk;
 use crate::serve::protocol::foxglove;
 use crate::serve::protocol::wire;
-use crate::sink::Profile;
+use crate::sink::{Profile, Transforms};
 use bytes::Bytes;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -204,7 +204,10 @@ impl Hub {
         Ok(Hub {
             sensors: SensorTable::new(plan, plans, settings.saved),
             clients: ClientTable::default(),
-            channels: ChannelTable::default(),
+            channels: ChannelTable {
+                frames: settings.frames,
+                ..ChannelTable::default()
+            },
             simulation: Simulation {
                 timeline: settings.timeline,
                 brings_samples: settings.brings_samples,
@@ -324,7 +327,7 @@ impl Hub {
             outbox.reply(self.server_info(controls));
             outbox.reply(foxglove::channels(
                 channels.values().flat_map(|c| c.topics()),
-                true,
+                self.channels.frames.transforms != Transforms::None,
             ));
             if let Some(place) = self.where_it_is().filter(|_| controls) {
                 outbox.reply(foxglove::playback_state(&place, false, ""));

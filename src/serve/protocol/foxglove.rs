@@ -162,7 +162,7 @@ pub(crate) fn advertise(channels: impl Iterator<Item = (u32, Topic)>) -> Bytes {
     text(&json!({"op": "advertise", "channels": channels}))
 }
 
-/// The channels with these topics; the first advertisement has the transforms, too.
+/// The channels with these topics; the first advertisement has the transforms, too, where there are some.
 pub(crate) fn channels(topics: impl Iterator<Item = (u32, Topic)>, with_transforms: bool) -> Bytes {
     let first = with_transforms.then(|| (TRANSFORMS, Topic::transforms()));
     advertise(first.into_iter().chain(topics))

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::net::{SocketAddr, TcpStream};
 use std::process::Command;
+use strapd::sink::Transforms;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
@@ -185,15 +186,19 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
 /// The covariance of a `sensor_msgs/msg/Imu` in CDR, and its quaternion (w, x, y, z), as the definition lays them
 /// out: a header of stamp and text, and then numbers at multiples of eight bytes from behind the encapsulation.
 fn imu(cdr: &[u8]) -> ([f64; 9], [f64; 4]) {
+    let number = numbers(cdr);
+    let [x, y, z, w] = std::array::from_fn(|n| number[n]);
+    (std::array::from_fn(|n| number[4 + n]), [w, x, y, z])
+}
+
+/// The numbers of a stamped message behind its header.
+fn numbers(cdr: &[u8]) -> Vec<f64> {
     let body = &cdr[4..];
     let length = u32::from_le_bytes(body[8..12].try_into().unwrap()) as usize;
     let at = (12 + length).next_multiple_of(8);
-    let number = |n: usize| {
-        let at = at + 8 * n;
-        f64::from_le_bytes(body[at..at + 8].try_into().unwrap())
-    };
-    let [x, y, z, w] = std::array::from_fn(number);
-    (std::array::from_fn(|n| number(4 + n)), [w, x, y, z])
+    let each = body[at..].chunks_exact(8);
+    each.map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap()))
+        .collect()
 }
 
 #[test]
@@ -264,6 +269,91 @@ fn an_aided_sensors_messages_have_the_filters_covariance_about_the_axes_of_the_w
         (sigma["heading"].as_f64().unwrap() - heading).abs() < 1e-9,
         "{sigma} {heading}"
     );
+}
+
+#[test]
+fn the_frames_asked_for_and_the_acceleration_without_gravity_reach_viewers() {
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.plan.aid = strapd_attitude::estimate::Aid::Gravity;
+    settings.hub.plan.linear_acceleration = true;
+    settings.hub.frames.world = Some("odom".to_owned());
+    settings.hub.frames.transforms = Transforms::Reverse;
+    let daemon = Daemon::start(settings);
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    let mut send = |id: &str, n: u64, accel: [f64; 3]| {
+        sender.send(&format!(
+            "{{\"id\":\"{id}\",\"stamp_ns\":{},\"gyro\":[0,0,0],\"accel\":{accel:?}}}",
+            1_700_000_000_000_000_000 + n * 10_000_000
+        ));
+        sender.next_of("ATT")
+    };
+    for id in ["imu0", "imu1"] {
+        (0..200).for_each(|n| drop(send(id, n, [0.0, 0.0, 9.81])));
+    }
+    let (mut viewer, _) = Viewer::connect(daemon.address(1), "foxglove.sdk.v1");
+    let channels = viewer.text("advertise")["channels"].clone();
+    let topics: Vec<_> = channels
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| {
+            (
+                c["topic"].as_str().unwrap(),
+                c["schemaName"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    let accel = "geometry_msgs/msg/AccelWithCovarianceStamped";
+    let expected = [
+        ("/tf", "tf2_msgs/msg/TFMessage"),
+        ("imu0/data", "sensor_msgs/msg/Imu"),
+        ("imu0/data/linear_acceleration", accel),
+        ("imu1/data", "sensor_msgs/msg/Imu"),
+        ("imu1/data/linear_acceleration", accel),
+    ];
+    assert_eq!(topics, expected);
+    for (id, channel) in [(7, 0), (8, 2)] {
+        let subscription = json!({"id": id, "channelId": channels[channel]["id"]});
+        viewer.send(&json!({"op": "subscribe", "subscriptions": [subscription]}));
+        // The last there is.
+        assert_eq!(viewer.binary(1)[1], id);
+    }
+    let att = send("imu0", 200, [0.0, 0.0, 10.31]);
+    let transform = viewer.binary(1);
+    let acceleration = viewer.binary(1);
+    let numbers = numbers(&acceleration[13..]);
+    for (n, found) in numbers[..3].iter().enumerate() {
+        assert_eq!(att["linear_acceleration"][n], *found);
+    }
+    assert!((numbers[2] - 0.5).abs() < 0.05 && numbers[5].is_nan());
+    let sigma = att["sigma_linear_acceleration"][2].as_f64().unwrap();
+    assert!((numbers[6 + 14].sqrt() - sigma).abs() < 1e-12);
+    // The world has one parent, the first sensor.
+    assert_eq!(transform[1], 7);
+    let has = |text: &[u8]| transform.windows(text.len()).any(|part| part == text);
+    assert!(has(b"odom\0") && has(b"imu0\0"));
+    let parent = transform.windows(5).position(|part| part == b"imu0\0");
+    assert!(parent < transform.windows(5).position(|part| part == b"odom\0"));
+    // The other has none.
+    send("imu1", 200, [0.0, 0.0, 9.81]);
+    send("imu0", 201, [0.0, 0.0, 9.81]);
+    for expected in [7, 8] {
+        assert_eq!(viewer.binary(1)[1], expected);
+    }
+}
+
+#[test]
+fn without_transforms_there_is_no_channel_for_them() {
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.frames.transforms = Transforms::None;
+    let daemon = Daemon::start(settings);
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    sender.send(&rate("imu0", 0, 0.5));
+    sender.next_of("ATT");
+    let (mut viewer, _) = Viewer::connect(daemon.address(1), "foxglove.sdk.v1");
+    let channels = viewer.text("advertise")["channels"].clone();
+    assert_eq!(channels.as_array().unwrap().len(), 1, "{channels}");
+    assert_eq!(channels[0]["topic"], "imu0/data");
 }
 
 #[test]

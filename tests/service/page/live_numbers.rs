@@ -244,3 +244,33 @@ fn a_simulation_is_held_against_its_truth() {
     assert!(worst < 0.05, "{worst} deg");
     browser.is_unharmed();
 }
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_live_sensors_acceleration_without_gravity_is_drawn_as_it_comes() {
+    let mut settings = listening(&[TCP, WS]);
+    settings.hub.plan.aid = strapd_attitude::estimate::Aid::Gravity;
+    settings.hub.plan.linear_acceleration = true;
+    let daemon = Daemon::start(settings);
+    let mut browser = Browser::start();
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    let line = |n: i64, accel: &str| {
+        let stamp = 1_700_000_000_000_000_000 + n * 10_000_000;
+        format!("{{\"id\":\"imu0\",\"stamp_ns\":{stamp},\"gyro\":[0,0,0]{accel}}}")
+    };
+    for n in 0..200 {
+        sender.send(&line(n, ",\"accel\":[0,0,9.81]"));
+    }
+    // A jolt upwards, and a sample without a force.
+    sender.send(&line(200, ",\"accel\":[0,0,12.31]"));
+    let words = "document.querySelector('[data-testid=plot-acceleration]').ariaValueText";
+    browser.until(
+        "a jolt",
+        &format!("/z 2\\.[45]/.test({words} ?? '') && !document.querySelector('[data-part=accelerationBox]').hidden"),
+    );
+    sender.send(&line(201, ""));
+    browser.until("nothing known", &format!("/z –/.test({words})"));
+    browser.is_unharmed();
+}

@@ -91,6 +91,34 @@ fn a_tab_that_comes_after_the_end_sees_curves_over_the_whole_axis() {
 
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn acceleration_without_gravity_is_a_plot_where_it_was_asked_for() {
+    let mut browser = Browser::start();
+    let hidden =
+        "document.querySelector('[data-testid=plot-acceleration]').closest('figure').hidden";
+    for (flags, is_shown) in [(&[][..], false), (&["--linear-acceleration"][..], true)] {
+        let process = played(&[&["--aid", "gravity"], flags].concat());
+        browser.go(process.address(0), "/");
+        browser.until_open();
+        until_whole(&mut browser, "/imu/data");
+        browser.until(
+            "drawn",
+            "__strapd.sensors['/imu/data'].plotted?.points > 100",
+        );
+        assert_eq!(browser.eval(hidden), json!(!is_shown));
+        if is_shown {
+            let ink = ink(&mut browser, "plot-acceleration");
+            assert!(ink.iter().all(|pixels| *pixels > 10.0), "{ink:?}");
+            // Also of what comes live, beside the whole.
+            browser.eval(&seek(9.0));
+            let spoken = "document.querySelector('[data-testid=plot-acceleration]').ariaValueText";
+            browser.until("words", &format!("{spoken}.includes('metres')"));
+        }
+        browser.is_unharmed();
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_replay_waits_for_who_looks_and_no_seek_clears_a_plot_or_a_figure() {
     let process = played(&[]);
     let mut browser = Browser::start();

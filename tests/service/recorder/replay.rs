@@ -1,6 +1,7 @@
 //! Promise: recordings replay to the attitude of what was received; and what recording costs in size.
 
 use super::{assert_whole, attitude, sample};
+use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,10 +9,11 @@ use std::time::Duration;
 use strapd::pipeline::opening;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::request::ReplayRequest;
-use strapd::serve::core::recorder::{Recorder, Settings};
+use strapd::serve::core::recorder::{Recorder, Settings, stream_of};
 use strapd::sink::Compression;
-use strapd::sink::{Options, Target};
-use strapd_attitude::record::RawSample;
+use strapd::sink::{Options, Target, Transforms};
+use strapd_attitude::frames::In;
+use strapd_attitude::record::{LinearAcceleration, RawSample};
 use strapd_recording::Recording;
 use strapd_recording::Selection;
 use strapd_recording::Source;
@@ -170,4 +172,56 @@ fn a_chunk_every_two_hundred_milliseconds_costs_a_few_hundred_bytes_each() {
             assert!(percent <= most_percent, "{said}");
         }
     }
+}
+
+#[test]
+fn a_recording_has_the_accelerations_and_the_transforms_that_its_streams_have() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("named.mcap");
+    let mut settings = Settings::new(&path);
+    settings.min_free = 0;
+    let recorder = Recorder::start(settings).unwrap();
+    let handle = recorder.handle();
+    for (id, transforms) in [("imu0", Transforms::None), ("imu1", Transforms::Reverse)] {
+        let mut stream = stream_of(id);
+        stream.has_linear_acceleration = id == "imu0";
+        stream.transforms = transforms;
+        stream.world_frame = "odom".to_owned();
+        handle.declare(stream);
+        for k in 0..20 {
+            let raw = sample(k, 100);
+            let mut made = attitude(&raw);
+            // The first is not known yet.
+            made.linear_acceleration = (k > 0).then(|| LinearAcceleration {
+                body: In::assume(Vector3::new(0.1 * k as f64, 0.0, -1.0)),
+                covariance: [0.01, 0.0, 0.0, 0.04, 0.0, 0.09],
+            });
+            handle.input(&Arc::from(id), vec![raw]);
+            handle.attitude(&Arc::from(id), k, vec![made]);
+        }
+    }
+    assert!(!recorder.finish().is_lossy());
+    let bytes = std::fs::read(&path).unwrap();
+    let mut counts = std::collections::BTreeMap::<String, usize>::new();
+    let mut transform = Vec::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        *counts.entry(message.channel.topic.clone()).or_default() += 1;
+        if message.channel.topic == "/tf" {
+            transform = message.data.to_vec();
+        }
+    }
+    let counts: Vec<_> = counts.iter().map(|(t, n)| (t.as_str(), *n)).collect();
+    let expected = [
+        ("/tf", 20),
+        ("imu0/data", 20),
+        ("imu0/data/linear_acceleration", 19),
+        ("imu0/data_raw", 20),
+        ("imu1/data", 20),
+        ("imu1/data_raw", 20),
+    ];
+    assert_eq!(counts, expected);
+    let at = |name: &[u8]| transform.windows(name.len()).position(|part| part == name);
+    let (sensor, world) = (at(b"imu1\0").unwrap(), at(b"odom\0").unwrap());
+    assert!(sensor < world, "the sensor is the parent");
 }

@@ -8,9 +8,10 @@
 //!        0 u8 mark 0xF8 | 1 u8 kind | 2 u16 length, of all | 4 u32 stream | 8 u64 seq | 16 i64 stamp ns
 //! RATE 1 24 3 x f64 gyro (48) | 48 3 x f64 accel (72) | 72 i64 interval ns (80) | 80 3 x f64 mag (104)
 //! ATT  2 24 4 x f64 q w, x, y, z | 56 3 x f64 rate | 80 3 x f64 sigma_deg | 104 u32 status | 108 u32 reset (112)
+//!        112 3 x f64 acceleration without gravity, body axes | 136 3 x f64 its sigma (160)
 //! ```
 //!
-//! A `RATE` may end after any of its four parts. What is longer than known is read by its known part. In
+//! A `RATE` may end after any of its four parts, an `ATT` after either of its two. What is longer than known is read by its known part. In
 //! a vector NaN is no data, as `null` in a line.
 
 mod binding;
@@ -24,6 +25,8 @@ pub const MARK: u8 = 0xF8;
 pub const HEAD: usize = 8;
 /// Bytes of an attitude.
 pub const ATT: usize = 112;
+/// Bytes of an attitude with its acceleration without gravity.
+const ATT_WITH_ACCELERATION: usize = 160;
 /// Bytes of a sample, with a specific force, with an interval too, and with a magnetic field.
 pub const RATE: [usize; 4] = [48, 72, 80, 104];
 /// The stamp, or interval, that is none.
@@ -82,6 +85,8 @@ pub struct Attitude {
     pub status: u32,
     /// Number of times it has been reset or held.
     pub reset: u32,
+    /// Acceleration without gravity along the body, m/s^2, and its standard deviation.
+    pub linear_acceleration: Option<([f64; 3], [f64; 3])>,
 }
 
 impl Attitude {
@@ -185,6 +190,9 @@ pub fn read(object: &[u8], received: Nanos) -> Result<Object, Unreadable> {
                 sigma_deg: floats_at(object, 80)?,
                 status: u32_at(object, 104)?,
                 reset: u32_at(object, 108)?,
+                linear_acceleration: floats_at(object, ATT)
+                    .and_then(some_vector)
+                    .zip(floats_at(object, ATT + 24)),
             };
             return Some(Object::Att { stream, attitude });
         }
@@ -212,15 +220,23 @@ pub fn read(object: &[u8], received: Nanos) -> Result<Object, Unreadable> {
 
 /// Appends an attitude, number `seq` of its stream.
 pub fn push_attitude(out: &mut Vec<u8>, stream: u32, seq: u64, sample: &AttitudeSample) {
-    let mut object = [0; ATT];
-    begin(&mut object, KIND_ATT, stream, seq, sample.stamp.0);
-    put_floats(&mut object, 24, sample.q_nb.wxyz());
-    put_floats(&mut object, 56, sample.rate.into());
+    let mut object = [0; ATT_WITH_ACCELERATION];
+    let object = match &sample.linear_acceleration {
+        Some(of) => {
+            put_floats(&mut object, ATT, (*of.body.as_vector()).into());
+            put_floats(&mut object, ATT + 24, of.sigma().into());
+            &mut object[..]
+        }
+        None => &mut object[..ATT],
+    };
+    begin(object, KIND_ATT, stream, seq, sample.stamp.0);
+    put_floats(object, 24, sample.q_nb.wxyz());
+    put_floats(object, 56, sample.rate.into());
     let sigma = sample.covariance.sigma().map(f64::to_degrees);
-    put_floats(&mut object, 80, sigma.into());
+    put_floats(object, 80, sigma.into());
     object[104..108].copy_from_slice(&u32::from(sample.status.0).to_le_bytes());
     object[108..112].copy_from_slice(&sample.reset_count.to_le_bytes());
-    out.extend_from_slice(&object);
+    out.extend_from_slice(object);
 }
 
 /// Appends a sample, number `seq` of its stream, as short as what it has allows. Stamped as its line
@@ -249,7 +265,7 @@ pub fn push_sample(out: &mut Vec<u8>, stream: u32, seq: u64, sample: &RawSample)
 }
 
 fn begin(object: &mut [u8], kind: u8, stream: u32, seq: u64, stamp: i64) {
-    // The longest is 112.
+    // The longest is 160.
     let [low, high] = (object.len() as u16).to_le_bytes();
     object[..4].copy_from_slice(&[MARK, kind, low, high]);
     object[4..8].copy_from_slice(&stream.to_le_bytes());

@@ -3,7 +3,7 @@
 use super::attitude_track::Track;
 use super::audience::Audience;
 use crate::error;
-use crate::sink::{self, Target};
+use crate::sink::{self, FrameNames, Target};
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
@@ -12,15 +12,6 @@ use strapd_attitude::estimate::EstimationSettings;
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Options;
 use strapd_recording::{Error, Selection, Source};
-
-/// Names of the frames of an attitude, instead of those of the recording and `world`.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct FrameNames {
-    /// `--frame-id`, or that of `--base-frame`: the frame whose attitude it is, of the one sensor of a run.
-    pub body: Option<String>,
-    /// `--world-frame`.
-    pub world: Option<String>,
-}
 
 /// A replay to be done.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@
 use super::delivery::{Delivery, Outlet};
 use super::provenance;
 use super::recorded::RecordedTrack;
-use super::request::{FrameNames, ReplayRequest};
+use super::request::ReplayRequest;
 use super::session::{Session, Topic, TopicInfo};
 use crate::error::{Error, Result};
 use crate::sink::{Stream, Transforms};
@@ -65,10 +65,10 @@ pub(super) fn topic(
 /// # Errors
 /// One name, or one world as a child, for several sensors.
 fn name_frames(run: &ReplayRequest, streams: &mut [Stream]) -> Result<()> {
-    let FrameNames { body, world } = &run.frames;
-    let is_reverse = run.options.transforms == Transforms::Reverse;
-    if streams.len() > 1 && (body.is_some() || is_reverse) {
-        let what = match body {
+    let frames = &run.frames;
+    let is_reverse = frames.transforms == Transforms::Reverse;
+    if streams.len() > 1 && (frames.body.is_some() || is_reverse) {
+        let what = match &frames.body {
             Some(name) => format!("{} sensors cannot all be the frame {name}", streams.len()),
             None => format!(
                 "--tf reverse: the world would have {} parents, a sensor each",
@@ -79,14 +79,7 @@ fn name_frames(run: &ReplayRequest, streams: &mut [Stream]) -> Result<()> {
             Diagnostic::new(what).help(format!("{TOPIC} NAME")),
         ));
     }
-    for stream in streams {
-        if let Some(world) = world {
-            stream.world_frame.clone_from(world);
-        }
-        if let Some(body) = body {
-            stream.frame_id.clone_from(body);
-        }
-    }
+    streams.iter_mut().for_each(|stream| frames.name(stream));
     Ok(())
 }
 

@@ -12,16 +12,17 @@ mod messages;
 pub mod payload;
 mod schemas;
 
+use super::Options;
 use super::batch::Batch;
 use super::form::{Form, Opening, Slot};
 use super::json::{AttObject, FrameTransform};
 use super::stream::{ChildFrames, Content, Provenance, Stream, named_frame, parent_frame};
-use super::{Options, Transforms};
 use crate::error::{Error, Result};
 use chunk::{Chunk, Compression};
 pub use file::Attachment;
 use file::McapFile;
-use messages::{CdrMessages, JsonMessages, Messages, SampleMessages, TruthMessages};
+use messages::acceleration_topic;
+use messages::{Acceleration, CdrMessages, JsonMessages, Messages, SampleMessages, TruthMessages};
 use std::collections::BTreeMap;
 use std::io;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -163,11 +164,7 @@ impl Layout {
         streams: &[Stream],
         provenance: &Provenance,
     ) -> Result<Layout> {
-        let Options {
-            encoding,
-            transforms,
-            ..
-        } = options;
+        let encoding = options.encoding;
         let metadata = push_head(file, out, encoding, provenance);
         let mut declare = |topic: &str, schema: [&str; 3], kind: Option<SampleKind>| {
             let [name, form, text] = schema;
@@ -191,13 +188,11 @@ impl Layout {
             ),
         };
         let topics = Declared::of(streams, encoding, attitude_schema, &mut declare)?;
-        let has_attitude = streams.iter().any(|s| s.content == Content::Attitude);
-        let transform = match has_attitude && transforms != Transforms::None {
-            true => Some((declare(TF_TOPIC, transform_schema, None)?, transforms)),
+        let transform = match streams.iter().any(Stream::has_transforms) {
+            true => Some(declare(TF_TOPIC, transform_schema, None)?),
             false => None,
         };
-        let in_cdr = transform.filter(|_| encoding == Encoding::Cdr);
-        file.transform_channel = in_cdr.map(|(id, _)| id);
+        file.transform_channel = transform.filter(|_| encoding == Encoding::Cdr);
 
         let mut frames = ChildFrames::default();
         let children: Vec<String> = streams.iter().map(|stream| frames.take(stream)).collect();
@@ -272,8 +267,7 @@ impl Declared {
         // In JSON it is a part of the attitude's object.
         for (stream, own) in streams.iter().zip(&mut all) {
             if stream.has_linear_acceleration && encoding == Encoding::Cdr {
-                let topic = format!("{}/linear_acceleration", stream.output_topic);
-                own.acceleration = Some(declare(&topic, ACCEL_SCHEMA, None)?);
+                own.acceleration = Some(declare(&acceleration_topic(stream), ACCEL_SCHEMA, None)?);
             }
         }
         Ok(all)
@@ -284,11 +278,13 @@ impl Declared {
         self,
         stream: &Stream,
         encoding: Encoding,
-        transform: Option<(u16, Transforms)>,
+        transform: Option<u16>,
         child: &str,
     ) -> Messages {
         let parent = parent_frame(stream);
         let main = self.main;
+        let transform = transform.filter(|_| stream.has_transforms());
+        let way = stream.transforms;
         match (&stream.content, encoding) {
             (Content::Samples(_), _) => Messages::Samples(SampleMessages {
                 channel: main,
@@ -306,16 +302,15 @@ impl Declared {
             (Content::Attitude, Encoding::Cdr) => Messages::Cdr(CdrMessages {
                 attitude: main,
                 imu: cdr::Imu::new(main, named_frame(stream, child)),
-                transform: transform.map(|(id, way)| (id, cdr::Tf::new(id, way, &parent, child))),
+                transform: transform.map(|id| (id, cdr::Tf::new(id, way, &parent, child))),
                 acceleration: self
                     .acceleration
-                    .map(|id| (id, cdr::Stamped::new(id, named_frame(stream, child)))),
+                    .map(|id| (id, Acceleration::new(id, named_frame(stream, child)))),
             }),
             (Content::Attitude, Encoding::Json) => Messages::Json(JsonMessages {
                 attitude: main,
                 att: AttObject::new(stream),
-                transform: transform
-                    .map(|(id, way)| (id, FrameTransform::new(way, &parent, child))),
+                transform: transform.map(|id| (id, FrameTransform::new(way, &parent, child))),
             }),
         }
     }

@@ -1,5 +1,6 @@
 //! Names of an output stream: topics, frames, labels. Pure.
 
+use super::Transforms;
 use std::collections::{BTreeMap, BTreeSet};
 use strapd_attitude::record::SampleKind;
 
@@ -48,6 +49,8 @@ pub struct Stream {
     pub frame_id: String,
     /// The frame it is given in: parent of the transform.
     pub world_frame: String,
+    /// Transforms between the two.
+    pub transforms: Transforms,
     /// Action of the quaternion: `sensor_to_world`, or `body_to_world` when a mounting was applied.
     pub rotates: String,
     /// Axes of the world: `start`, `enu`, `ned`, `nwu`.
@@ -70,10 +73,17 @@ impl Stream {
             has_linear_acceleration: false,
             frame_id: frame_id.to_owned(),
             world_frame: "world".to_owned(),
+            transforms: Transforms::Forward,
             rotates: "sensor_to_world".to_owned(),
             world_axes: "start".to_owned(),
             body_axes: "flu".to_owned(),
         }
+    }
+
+    /// Whether its attitudes come with transforms.
+    #[must_use]
+    pub fn has_transforms(&self) -> bool {
+        self.content == Content::Attitude && self.transforms != Transforms::None
     }
 
     /// The same with every name cut to what can safely be repeated in each message.
@@ -88,10 +98,35 @@ impl Stream {
             has_linear_acceleration: self.has_linear_acceleration,
             frame_id: bounded(&self.frame_id),
             world_frame: bounded(&self.world_frame),
+            transforms: self.transforms,
             rotates: bounded(&self.rotates),
             world_axes: bounded(&self.world_axes),
             body_axes: bounded(&self.body_axes),
         }
+    }
+}
+
+/// Names of the frames of attitudes, instead of those of the recording and `world`, and the transforms between them.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct FrameNames {
+    /// `--frame-id`, or that of `--base-frame`: the frame whose attitude it is, of the one sensor of a run.
+    pub body: Option<String>,
+    /// `--world-frame`.
+    pub world: Option<String>,
+    /// `--tf`.
+    pub transforms: Transforms,
+}
+
+impl FrameNames {
+    /// Gives a stream these names.
+    pub fn name(&self, stream: &mut Stream) {
+        if let Some(world) = &self.world {
+            stream.world_frame.clone_from(world);
+        }
+        if let Some(body) = &self.body {
+            stream.frame_id.clone_from(body);
+        }
+        stream.transforms = self.transforms;
     }
 }
 

@@ -8,7 +8,7 @@ use crate::serve::protocol::foxglove;
 use crate::serve::protocol::foxglove::frames::{TRANSFORMS, stream_of};
 use crate::serve::protocol::position::{Action, Part, Position};
 use crate::serve::protocol::wire;
-use crate::sink::{Profile, Stream};
+use crate::sink::{Profile, Stream, Transforms};
 use bytes::Bytes;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -32,6 +32,26 @@ impl Hub {
         classes.sort_unstable();
         classes.dedup();
         classes
+    }
+
+    /// The labels of a sensor, with the frames that were asked for. The world has one parent at most: of all sensors whose
+    /// transforms lead to it the first one's stay.
+    pub(super) fn named(&self, labels: &Stream) -> Stream {
+        let mut named = labels.clone();
+        self.channels.frames.name(&mut named);
+        let is_reverse = |stream: &Stream| stream.transforms == Transforms::Reverse;
+        if is_reverse(&named) {
+            let channels = read(&self.channels.by_number);
+            if let Some(first) = channels.values().find(|c| is_reverse(c.stream())) {
+                tracing::warn!(
+                    id = %named.id,
+                    "no transforms of it: with --tf reverse the world is a child of {} already",
+                    first.child()
+                );
+                named.transforms = Transforms::None;
+            }
+        }
+        named
     }
 
     /// A further stream; viewers are told.

@@ -106,7 +106,7 @@ impl Hub {
             run.head,
             run.samples,
             (last, sensors.len() < WATCHED),
-            |labels| self.declare(labels),
+            |labels| self.declare(&self.named(labels)),
         )?;
         lock(&self.sensors.absent).remove(&id);
         if let Some(recorder) = &self.recorder {

@@ -5,6 +5,7 @@ use crate::serve::core::{recorder, state};
 use crate::serve::guard::admission::Token;
 use crate::serve::guard::limits::Limits;
 use crate::serve::protocol::position::Timeline;
+use crate::sink::FrameNames;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::estimate::EstimationSettings;
@@ -20,6 +21,8 @@ pub struct Settings {
     pub plan: EstimationSettings,
     /// Settings for sensors that are understood in another way, by `id`.
     pub plans: BTreeMap<String, EstimationSettings>,
+    /// Names of the frames of sensors, and the transforms between them.
+    pub frames: FrameNames,
     /// The bounds.
     pub limits: Limits,
     /// Token that clients must show.

@@ -8,7 +8,7 @@ use super::{Client, Sensor};
 use crate::serve::core::channel::Channel;
 use crate::serve::core::state;
 use crate::serve::protocol::position::Timeline;
-use crate::sink::ChildFrames;
+use crate::sink::{ChildFrames, FrameNames};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Arc, Mutex, RwLock};
@@ -77,6 +77,8 @@ pub(super) struct ChannelTable {
     pub(super) last: AtomicU32,
     /// Child frames of the transforms of all channels.
     pub(super) child_frames: Mutex<ChildFrames>,
+    /// Names of the frames of sensors, and the transforms between them.
+    pub(super) frames: FrameNames,
 }
 
 /// The replay or simulation behind what is served.

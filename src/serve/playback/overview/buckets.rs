@@ -6,11 +6,11 @@
 use std::ops::Range;
 
 /// Series with a least and a greatest value: rates about x, y, z (deg/s), roll, pitch, yaw without jumps (deg), error
-/// (deg).
-pub(super) const SERIES: usize = 7;
+/// (deg), acceleration without gravity along x, y, z of the world (m/s^2).
+pub(super) const SERIES: usize = 10;
 
 /// Number of the error among them.
-const ERROR: usize = 6;
+pub(super) const ERROR: usize = 6;
 
 /// One stretch of time.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! One stream of a recording -> its curves over the whole of it, and how far it is from its reference. Pure.
 
-use super::buckets::{Bucket, Buckets};
+use super::buckets::{Bucket, Buckets, ERROR, SERIES};
 use crate::sink::Stream;
 use serde_json::{Map, Value, json};
 use std::collections::VecDeque;
@@ -26,6 +26,8 @@ pub(super) struct Course {
     /// Roll, pitch and yaw of the last sample, without jumps, deg.
     angles: [f64; 3],
     resets: u32,
+    /// Whether some attitude carries the acceleration without gravity.
+    has_acceleration: bool,
     errors: Errors,
 }
 
@@ -56,6 +58,7 @@ impl Course {
             start: None,
             angles: [0.0; 3],
             resets: 0,
+            has_acceleration: false,
             errors: Errors::default(),
         }
     }
@@ -89,7 +92,12 @@ impl Course {
         let [x, y, z]: [f64; 3] = sample.rate.into();
         let [x, y, z] = [x, y, z].map(f64::to_degrees);
         let [roll, pitch, yaw] = self.angles;
-        let values = [x, y, z, roll, pitch, yaw, f64::NAN].map(|v| v as f32);
+        let acceleration = sample.linear_acceleration;
+        self.has_acceleration |= acceleration.is_some();
+        let [east, north, up]: [f64; 3] = acceleration.map_or([f64::NAN; 3], |of| {
+            (*of.in_world(&sample.q_nb).as_vector()).into()
+        });
+        let values = [x, y, z, roll, pitch, yaw, f64::NAN, east, north, up].map(|v| v as f32);
         self.buckets.push(at, sample.q_nb.wxyz(), values, is_cut);
         if is_estimate {
             let waiting = &mut self.errors.waiting;
@@ -160,12 +168,17 @@ impl Course {
         put("count", of(&|b| json!(b.count)));
         put("cut", of(&|b| json!(u8::from(b.is_cut))));
         put("q", of(&|b| json!(b.q)));
+        let known = if self.has_acceleration {
+            SERIES
+        } else {
+            ERROR + 1
+        };
         for (name, series) in [("first", 0), ("low", 1), ("high", 2)] {
             put(
                 name,
                 of(&|b| {
                     let values = [&b.first, &b.low, &b.high];
-                    json!(values.get(series))
+                    json!(values.get(series).and_then(|all| all.get(..known)))
                 }),
             );
         }

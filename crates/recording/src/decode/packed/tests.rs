@@ -2,8 +2,9 @@
 
 use super::*;
 use nalgebra::Vector3;
+use strapd_attitude::frames::In;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
-use strapd_attitude::record::{AttitudeCovariance, Status};
+use strapd_attitude::record::{AttitudeCovariance, LinearAcceleration, Status};
 
 /// An attitude with nothing special about it.
 fn sample(stamp: Nanos) -> AttitudeSample {
@@ -252,4 +253,30 @@ fn a_stretch_is_taken_apart_and_a_rest_left_out() {
     let lengths: Vec<_> = objects(&stretch).map(<[u8]>::len).collect();
     assert_eq!(lengths, [48, 8, 112]);
     assert!(is_packed(&stretch) && !is_packed(b"{}\n") && !is_packed(b""));
+}
+
+#[test]
+fn an_attitude_carries_its_acceleration_where_there_is_one_and_old_readers_read_the_rest() {
+    let mut s = sample(Nanos(7));
+    let mut plain = Vec::new();
+    push_attitude(&mut plain, 2, 1, &s);
+    s.linear_acceleration = Some(LinearAcceleration {
+        body: In::assume(Vector3::new(0.5, -0.25, 2.0)),
+        covariance: [0.01, 0.0, 0.0, 0.04, 0.0, 0.09],
+    });
+    let mut bytes = Vec::new();
+    push_attitude(&mut bytes, 2, 1, &s);
+    assert_eq!((plain.len(), bytes.len()), (112, 160));
+    // But for its length it begins as the shorter one.
+    assert_eq!(bytes[4..112], plain[4..]);
+    let read = |bytes: &[u8]| match read(bytes, Nanos(0)).unwrap() {
+        Object::Att { attitude, .. } => attitude.linear_acceleration,
+        Object::Rate { .. } => panic!("no attitude"),
+    };
+    let (acceleration, sigma) = read(&bytes).unwrap();
+    assert_eq!(acceleration, [0.5, -0.25, 2.0]);
+    for (found, expected) in sigma.into_iter().zip([0.1, 0.2, 0.3]) {
+        assert!((found - expected).abs() < 1e-15);
+    }
+    assert_eq!(read(&plain), None);
 }

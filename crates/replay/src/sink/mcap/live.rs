@@ -8,10 +8,12 @@
 use super::cdr::{self, ros_time};
 use super::chunk::{Chunk, Compression};
 use super::file::McapFile;
-use super::{Encoding, IMU_SCHEMA, Provenance, Stream, TF_SCHEMA, TF_TOPIC, push_head};
+use super::messages::{Acceleration, acceleration_topic};
+use super::{
+    ACCEL_SCHEMA, Encoding, IMU_SCHEMA, Provenance, Stream, TF_SCHEMA, TF_TOPIC, push_head,
+};
 use super::{log_time, too_many_channels};
 use crate::error::{Error, Result};
-use crate::sink::Transforms;
 use crate::sink::stream::{ChildFrames, named_frame, parent_frame};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,7 +30,8 @@ pub struct LiveMcap {
     file: McapFile,
     compression: Compression,
     metadata: BTreeMap<String, String>,
-    transform: u16,
+    /// Channel of the transforms, once a stream has some.
+    transform: Option<u16>,
     frames: ChildFrames,
     layouts: Vec<Layout>,
     chunk: Chunk,
@@ -45,7 +48,8 @@ struct Layout {
     input_imu: cdr::Imu,
     attitude: u16,
     imu: cdr::Imu,
-    tf: cdr::Tf,
+    acceleration: Option<(u16, Acceleration)>,
+    tf: Option<(u16, cdr::Tf)>,
     last: Option<Nanos>,
 }
 
@@ -58,20 +62,18 @@ impl LiveMcap {
         let mut file = McapFile::default();
         let mut declared = Vec::new();
         let metadata = push_head(&mut file, &mut declared, Encoding::Cdr, provenance);
-        let mut live = LiveMcap {
+        Ok(LiveMcap {
             file,
             compression,
             metadata,
-            transform: 0,
+            transform: None,
             frames: ChildFrames::default(),
             layouts: Vec::new(),
             chunk: Chunk::default(),
             declared,
             sealed: Vec::new(),
             has_chunk: false,
-        };
-        live.transform = live.declare(TF_TOPIC, TF_SCHEMA, &[])?;
-        Ok(live)
+        })
     }
 
     /// A channel, whose metadata says `more`.
@@ -95,6 +97,9 @@ impl LiveMcap {
     /// [`Error::Usage`] when there are more than MCAP can number.
     pub fn stream(&mut self, stream: &Stream) -> Result<LiveStream> {
         let stream = stream.bounded();
+        if stream.has_transforms() && self.transform.is_none() {
+            self.transform = Some(self.declare(TF_TOPIC, TF_SCHEMA, &[])?);
+        }
         let kind = stream
             .input_kind
             .map(|kind| (SAMPLE_KIND.name(), kind.name()));
@@ -105,6 +110,10 @@ impl LiveMcap {
             ("body", &stream.body_axes),
         ];
         let attitude = self.declare(&stream.output_topic, IMU_SCHEMA, &axes)?;
+        let acceleration = match stream.has_linear_acceleration {
+            true => Some(self.declare(&acceleration_topic(&stream), ACCEL_SCHEMA, &[])?),
+            false => None,
+        };
         let parent = parent_frame(&stream);
         let frame_id = stream.frame_id.clone();
         let child = self.frames.take(&stream);
@@ -113,7 +122,12 @@ impl LiveMcap {
             input_imu: cdr::Imu::new(input, &frame_id),
             attitude,
             imu: cdr::Imu::new(attitude, named_frame(&stream, &child)),
-            tf: cdr::Tf::new(self.transform, Transforms::Forward, &parent, &child),
+            acceleration: acceleration
+                .map(|id| (id, Acceleration::new(id, named_frame(&stream, &child)))),
+            tf: self
+                .transform
+                .filter(|_| stream.has_transforms())
+                .map(|id| (id, cdr::Tf::new(id, stream.transforms, &parent, &child))),
             last: None,
         });
         Ok(LiveStream(self.layouts.len() - 1))
@@ -149,11 +163,18 @@ impl LiveMcap {
         let plain = &mut self.chunk.plain;
         layout.imu.append(plain, n, log_time, stamp, sample);
         // A repeat of a stamp is what tf2 warns about.
-        if layout.last.replace(sample.stamp) != Some(sample.stamp) {
-            let lane = self.chunk.lane(self.transform);
+        if layout.last.replace(sample.stamp) != Some(sample.stamp)
+            && let Some((id, tf)) = &layout.tf
+        {
+            let lane = self.chunk.lane(*id);
             self.chunk.note(lane, log_time);
-            let plain = &mut self.chunk.plain;
-            layout.tf.append(plain, n, log_time, stamp, sample);
+            tf.append(&mut self.chunk.plain, n, log_time, stamp, sample);
+        }
+        let acceleration = layout.acceleration.as_ref().zip(sample.linear_acceleration);
+        if let Some(((id, message), of)) = acceleration {
+            let lane = self.chunk.lane(*id);
+            self.chunk.note(lane, log_time);
+            message.append(&mut self.chunk.plain, n, log_time, stamp, &of);
         }
         fits
     }

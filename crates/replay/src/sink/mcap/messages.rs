@@ -4,6 +4,7 @@
 
 use super::super::batch::Batch;
 use super::super::json::{AttObject, FrameTransform};
+use super::super::stream::Stream;
 use super::chunk::Chunk;
 use super::{cdr, log_time};
 use strapd_attitude::record::LinearAcceleration;
@@ -38,7 +39,7 @@ pub(super) struct CdrMessages {
     /// Transforms, if there are some.
     pub(super) transform: Option<(u16, cdr::Tf)>,
     /// The acceleration without gravity, where attitudes carry it.
-    pub(super) acceleration: Option<(u16, cdr::Stamped<42>)>,
+    pub(super) acceleration: Option<(u16, Acceleration)>,
 }
 
 impl CdrMessages {
@@ -73,10 +74,42 @@ impl CdrMessages {
             }
             if let Some(((lane, message), of)) = acceleration.zip(sample.linear_acceleration) {
                 chunk.note(lane, log_time);
-                let numbers = accel_with_covariance(&of);
-                message.append(&mut chunk.plain, n as u32, log_time, stamp, numbers);
+                message.append(&mut chunk.plain, n as u32, log_time, stamp, &of);
             }
         }
+    }
+}
+
+/// Topic of the acceleration without gravity beside the attitudes of a stream.
+pub(super) fn acceleration_topic(stream: &Stream) -> String {
+    format!("{}/linear_acceleration", stream.output_topic)
+}
+
+/// The acceleration without gravity as `geometry_msgs/msg/AccelWithCovarianceStamped`.
+#[derive(Debug)]
+pub(super) struct Acceleration(cdr::Stamped<42>);
+
+impl Acceleration {
+    pub(super) fn new(channel: u16, frame_id: &str) -> Acceleration {
+        Acceleration(cdr::Stamped::new(channel, frame_id))
+    }
+
+    /// Bytes of one message record.
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Appends the record.
+    pub(super) fn append(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        of: &LinearAcceleration,
+    ) {
+        let numbers = accel_with_covariance(of);
+        self.0.append(out, sequence, log_time, stamp, numbers);
     }
 }
 

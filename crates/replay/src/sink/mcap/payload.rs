@@ -3,8 +3,8 @@
 //! The same encoders and topics as in a file, for those who take messages one by one.
 
 use super::cdr::{self, ros_time};
-use super::{IMU_SCHEMA, TF_SCHEMA, TF_TOPIC, schemas};
-use crate::sink::Transforms;
+use super::messages::{Acceleration, acceleration_topic};
+use super::{ACCEL_SCHEMA, IMU_SCHEMA, QUATERNION_SCHEMA, TF_SCHEMA, TF_TOPIC, VECTOR_SCHEMA};
 use crate::sink::stream::{Content, Stream, named_frame, parent_frame};
 use strapd_attitude::record::{AttitudeSample, RawSample};
 use strapd_recording::mcap::MessageRecord;
@@ -42,8 +42,12 @@ pub struct Payloads(Encoders);
 
 #[derive(Debug)]
 enum Encoders {
-    /// Attitudes, and transforms for [`Topic::transforms`].
-    Attitude { imu: cdr::Imu, tf: cdr::Tf },
+    /// Attitudes, accelerations without gravity, and transforms for [`Topic::transforms`].
+    Attitude {
+        imu: cdr::Imu,
+        acceleration: Option<Acceleration>,
+        tf: Option<cdr::Tf>,
+    },
     /// Samples of a sensor.
     Samples { imu: cdr::Imu },
     /// True attitude and rate.
@@ -62,7 +66,12 @@ impl Payloads {
         Payloads(match stream.content {
             Content::Attitude => Encoders::Attitude {
                 imu: cdr::Imu::new(0, named_frame(&stream, child)),
-                tf: cdr::Tf::new(0, Transforms::Forward, &parent, child),
+                acceleration: stream
+                    .has_linear_acceleration
+                    .then(|| Acceleration::new(0, named_frame(&stream, child))),
+                tf: stream
+                    .has_transforms()
+                    .then(|| cdr::Tf::new(0, stream.transforms, &parent, child)),
             },
             Content::Samples(_) => Encoders::Samples {
                 imu: cdr::Imu::new(0, &stream.frame_id),
@@ -74,29 +83,20 @@ impl Payloads {
         })
     }
 
-    /// The topics of the stream's own, in the order of their messages.
+    /// The topics of the stream's own: that of its attitudes or samples, and a second one for what stands beside them.
     #[must_use]
     pub fn topics(stream: &Stream) -> Vec<Topic> {
-        let name = stream.bounded().output_topic;
+        let stream = stream.bounded();
+        let name = &stream.output_topic;
         match stream.content {
-            Content::Attitude | Content::Samples(_) => vec![Topic::new(&name, IMU_SCHEMA)],
+            Content::Attitude if stream.has_linear_acceleration => vec![
+                Topic::new(name, IMU_SCHEMA),
+                Topic::new(&acceleration_topic(&stream), ACCEL_SCHEMA),
+            ],
+            Content::Attitude | Content::Samples(_) => vec![Topic::new(name, IMU_SCHEMA)],
             Content::Truth => vec![
-                Topic::new(
-                    &name,
-                    [
-                        "geometry_msgs/msg/QuaternionStamped",
-                        "ros2msg",
-                        schemas::QUATERNION_STAMPED,
-                    ],
-                ),
-                Topic::new(
-                    &format!("{name}/rate"),
-                    [
-                        "geometry_msgs/msg/Vector3Stamped",
-                        "ros2msg",
-                        schemas::VECTOR3_STAMPED,
-                    ],
-                ),
+                Topic::new(name, QUATERNION_SCHEMA),
+                Topic::new(&format!("{name}/rate"), VECTOR_SCHEMA),
             ],
         }
     }
@@ -114,14 +114,27 @@ impl Payloads {
         });
     }
 
-    /// Appends what stands beside the attitude: the transform, or the true rate.
+    /// Appends what stands beside the attitude on the second topic: the acceleration without gravity, or the true rate.
+    /// Without it nothing is appended.
     pub fn beside(&self, out: &mut Vec<u8>, sample: &AttitudeSample) {
         let (stamp, _) = ros_time(sample.stamp);
         headless(out, |record| match &self.0 {
-            Encoders::Attitude { tf, .. } => tf.append(record, 0, 0, stamp, sample),
+            Encoders::Attitude { acceleration, .. } => {
+                if let Some((message, of)) = acceleration.as_ref().zip(sample.linear_acceleration) {
+                    message.append(record, 0, 0, stamp, &of);
+                }
+            }
             Encoders::Truth { rate, .. } => rate.append(record, 0, 0, stamp, sample.rate.into()),
             Encoders::Samples { .. } => {}
         });
+    }
+
+    /// Appends its transform, where it has one.
+    pub fn transform(&self, out: &mut Vec<u8>, sample: &AttitudeSample) {
+        if let Encoders::Attitude { tf: Some(tf), .. } = &self.0 {
+            let (stamp, _) = ros_time(sample.stamp);
+            headless(out, |record| tf.append(record, 0, 0, stamp, sample));
+        }
     }
 
     /// Appends what a sensor put out.
