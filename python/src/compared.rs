@@ -101,6 +101,16 @@ pub(crate) fn stamped(
     q: &Rows<'_>,
     from: Convention,
 ) -> PyResult<Vec<Stamped>> {
+    let rows = rows(name, t, q)?;
+    Ok(rows.map(|(t, q)| (t, in_flu(from, q))).collect())
+}
+
+/// Stamps and w, x, y, z as they are.
+pub(crate) fn rows<'a>(
+    name: &str,
+    t: &'a Times<'_>,
+    q: &'a Rows<'_>,
+) -> PyResult<impl Iterator<Item = (Nanos, [f64; 4])> + use<'a>> {
     let (t, flat) = match (t.as_slice(), q.as_slice()) {
         (Ok(t), Ok(q)) => (t, q),
         _ => return Err(argument(format!("{name}: not C-contiguous"))),
@@ -113,10 +123,7 @@ pub(crate) fn stamped(
         )));
     }
     let (rows, _) = flat.as_chunks::<4>();
-    Ok(t.iter()
-        .zip(rows)
-        .map(|(t, q)| (Nanos(*t), in_flu(from, *q)))
-        .collect())
+    Ok(t.iter().zip(rows).map(|(t, q)| (Nanos(*t), *q)))
 }
 
 /// Converts to FLU. A row that is no rotation stays what it is, and the comparison counts it.

@@ -13,6 +13,7 @@
 //! | [`live`] | samples as they come -> attitudes |
 //! | [`calibration`] | the calibration of a sensor <-> a dict |
 //! | [`compared`] | two attitudes -> how far apart |
+//! | [`between`] | attitudes of a run -> attitudes at other instants |
 //! | [`joint`] | attitudes of two bodies -> one relative to the other |
 //! | [`words`] | the command's flags -> a replay to be done |
 //! | [`recorded`] | a recorded log -> attitudes |
@@ -26,6 +27,7 @@
 use pyo3::prelude::*;
 
 mod batch;
+mod between;
 mod calibration;
 mod columns;
 mod compared;
@@ -47,6 +49,8 @@ mod words;
 mod _strapd {
     #[pymodule_export]
     use crate::batch::estimate;
+    #[pymodule_export]
+    use crate::between::at;
     #[pymodule_export]
     use crate::compared::compare;
     #[pymodule_export]

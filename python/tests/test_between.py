@@ -44,7 +44,11 @@ def test_frames_between_samples_are_those_of_the_motion_and_no_nearest_ones(jitt
     assert errors[0] / errors[1] > 5 and errors[1] / errors[2] > 5
     att = sampled(100, jitter)
     assert (att.at(att.t) == att.q).all()
-    assert (att.at(frames.astype("datetime64[ns]")) == att.at(frames)).all()
+    found = att.at(frames)
+    assert (att.at(frames.astype("datetime64[ns]")) == found).all()
+    # In any order, and one of them twice.
+    order = np.r_[np.random.default_rng(2).permutation(len(frames)), 7]
+    assert (att.at(frames[order]) == found[order]).all()
 
 
 def test_instants_without_an_attitude_are_nan_and_counted():

@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Status of an attitude that does not go on from the one before it: there is no motion to follow.
-const CUTS: Status =
+pub const CUTS: Status =
     Status(Status::HELD.0 | Status::RESET.0 | Status::RESTARTED.0 | Status::LEVELLED.0);
 
 /// Attitudes that are waited for on either side of an instant.

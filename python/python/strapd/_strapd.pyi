@@ -8,7 +8,7 @@ _Floats = npt.NDArray[np.float64]
 _Nanos = npt.NDArray[np.int64]
 _Outcome = tuple[str, list[str], dict[str, Any]]
 
-__all__ = ["Live", "__version__", "check_log", "check_settings", "compare", "estimate", "info", "read", "relative", "replay", "simulate"]
+__all__ = ["Live", "__version__", "at", "check_log", "check_settings", "compare", "estimate", "info", "read", "relative", "replay", "simulate"]
 
 __version__: str
 
@@ -22,6 +22,7 @@ def estimate(
     settings: dict[str, Any],
     /,
 ) -> tuple[dict[str, Any], _Outcome]: ...
+def at(t: _Nanos, q: _Floats, status: npt.NDArray[np.uint16], instants: _Nanos, /) -> tuple[_Floats, int, int]: ...
 def compare(
     t: _Nanos,
     q: _Floats,
