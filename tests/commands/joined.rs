@@ -212,3 +212,36 @@ fn who_gives_files_that_continue_each_other_is_told_once_of_the_flag() {
     let ran = strapd(at, "replay --join c.mcap a.mcap b.mcap -o null:");
     assert!(!ran.done().err.contains("goes on"), "{ran:?}");
 }
+
+/// What a recorder leaves that is killed as it begins its next file.
+#[test]
+fn a_part_that_holds_nothing_is_left_out_with_a_word() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    cut(&fixture("ximu3.mcap"), at, &["a.mcap", "b.mcap"]);
+    let whole = strapd(at, "replay --join a.mcap b.mcap -o whole.ndjson");
+    whole.done();
+    fs::write(at.join("none.mcap"), "").unwrap();
+    let mut begun = mcap::Writer::new(fs::File::create(at.join("begun.mcap")).unwrap()).unwrap();
+    begun.finish().unwrap();
+    drop(begun);
+    let head = fs::read(at.join("begun.mcap")).unwrap();
+    fs::write(at.join("killed.mcap"), &head[..40]).unwrap();
+    for part in ["none", "begun", "killed"] {
+        let join = format!("replay --join a.mcap b.mcap {part}.mcap --force -o out.ndjson");
+        let ran = strapd(at, &join);
+        assert!(
+            ran.err
+                .contains(&format!("{part}.mcap: holds no message, and is left out")),
+            "{ran:?}"
+        );
+        let [found, expected] =
+            ["out", "whole"].map(|n| fs::read(at.join(n.to_owned() + ".ndjson")).unwrap());
+        assert!(found == expected, "{part}");
+        ran.done();
+        let alone = format!("replay --join {part}.mcap -o alone.ndjson");
+        assert_ne!(strapd(at, &alone).code, Some(0));
+    }
+    strapd(at, "replay --join killed.mcap begun.mcap -o no.ndjson")
+        .refused(1, &["nothing in it has a time"]);
+}

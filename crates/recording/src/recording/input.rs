@@ -8,6 +8,7 @@
 use super::archive::{self, Unpacked};
 use super::folder::{self, Folder};
 use super::line_input;
+use super::parts::say_left_out;
 use super::several;
 use super::warn::Warn;
 use crate::address::Address;
@@ -229,8 +230,14 @@ impl Input {
     /// One cannot be opened, comes only once, is a folder or given twice, or is of another format than the first.
     pub fn joined(paths: &[PathBuf], warn: &Warn) -> Result<Input> {
         several::checked(paths)?;
+        let is_empty = |path: &PathBuf| std::fs::metadata(path).is_ok_and(|found| found.len() == 0);
+        let (empty, paths): (Vec<_>, Vec<_>) = paths.iter().cloned().partition(is_empty);
+        match (empty.first(), paths.is_empty()) {
+            (Some(path), true) => return Err(Error::Empty { path: path.clone() }),
+            _ => empty.iter().for_each(|path| say_left_out(path, warn)),
+        }
         let mut formats = Vec::new();
-        for path in paths {
+        for path in &paths {
             let format = recognised(path, warn)?;
             if let Some((first, other)) = formats.first().filter(|(_, other)| *other != format) {
                 let first: &PathBuf = first;
@@ -248,12 +255,12 @@ impl Input {
             formats.push((path.clone(), format));
         }
         Ok(Input {
-            source: Source::Parts(paths.to_vec()),
-            name: several::title(paths),
+            name: several::title(&paths),
             kept: None,
             format: formats.first().map_or(Format::Mcap, |(_, format)| *format),
             beside: Vec::new(),
-            parts: paths.to_vec(),
+            source: Source::Parts(paths.clone()),
+            parts: paths,
             unpacked: None,
             warn: warn.clone(),
         })

@@ -16,6 +16,7 @@ use super::sources::{self, ChannelMap, Publisher};
 use super::text_log::TextLog;
 use crate::decode::Options;
 use crate::error::{Error, Result};
+use crate::format::Format;
 use crate::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use crate::pool::Pool;
 use std::collections::BTreeMap;
@@ -99,21 +100,41 @@ impl Recording {
     }
 
     fn of_parts(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
-        let mut logs = Vec::new();
+        let (mut logs, mut empty) = (Vec::new(), Vec::new());
         // All in memory: a file for each were too many of them.
         let kept = sample_cache::IN_MEMORY / input.parts().len().max(1) as u64;
+        // Of the others what cannot be decoded has no message, either.
+        let counts = matches!(
+            input.format(),
+            Format::Mcap | Format::Ulog | Format::Bag | Format::Rosbag2
+        );
         for path in input.parts() {
             let log = Recording::of_one(&Input::open(path, input.warn())?, options, kept, pool)?;
             log.say_notes();
-            logs.push((parts::times(path, &log.survey)?, log));
+            match log.survey.times {
+                Some(times) => logs.push((times, log)),
+                None if counts && log.channels.iter().all(|known| known.messages == 0) => {
+                    empty.push(log);
+                }
+                None => return Err(parts::without_time(path)),
+            }
+        }
+        if let (true, Some(log)) = (logs.is_empty(), empty.first()) {
+            return Err(parts::without_time(log.name()));
         }
         logs.sort_by_key(|(times, _)| *times);
         let mut whole = Whole::new(input.warn());
         let (mut problems, mut body) = (Vec::new(), Vec::new());
-        for (_, log) in logs {
-            let same = whole.add(log.name(), &log.channels, &log.survey)?;
+        for log in logs.iter().map(|(_, log)| log).chain(&empty) {
             let name = log.name().display();
             problems.extend(log.problems.iter().map(|what| format!("{name}: {what}")));
+        }
+        // The last part of a recorder that was killed.
+        for log in &empty {
+            parts::say_left_out(log.name(), input.warn());
+        }
+        for (times, log) in logs {
+            let same = whole.add((log.name(), times), &log.channels, &log.survey)?;
             body.push((log, same));
         }
         Ok(Recording {

@@ -50,20 +50,19 @@ pub(super) struct Whole {
     warn: Warn,
 }
 
-/// The time of a part, by which they are put in order.
-///
-/// # Errors
-/// It has none.
-pub(super) fn times(name: &Path, survey: &Survey) -> Result<(u64, u64)> {
-    survey.times.ok_or_else(|| {
-        Error::unsupported(
-            name,
-            Diagnostic::new(
-                "nothing in it has a time, so that its place among the parts is not known",
-            )
+/// Says of a part that holds no message that the others are joined without it.
+pub(super) fn say_left_out(name: &Path, warn: &Warn) {
+    let name = printable(&name.display().to_string());
+    warn.say(&format!("{name}: holds no message, and is left out"));
+}
+
+/// Error of a part without a time, by which they are put in order.
+pub(super) fn without_time(name: &Path) -> Error {
+    Error::unsupported(
+        name,
+        Diagnostic::new("nothing in it has a time, so that its place among the parts is not known")
             .help("leave it out"),
-        )
-    })
+    )
 }
 
 /// Whether one file can follow another: what lies between them is said.
@@ -122,17 +121,16 @@ impl Whole {
         }
     }
 
-    /// Puts the next part, in the order of their times, behind the others.
+    /// Puts the next part, in the order of their times (first and last), behind the others.
     ///
     /// # Errors
-    /// It has no time, is of the time of the one before it, or of other sensors.
+    /// It is of the time of the one before it, or of other sensors.
     pub(super) fn add(
         &mut self,
-        name: &Path,
+        (name, now): (&Path, (u64, u64)),
         channels: &[LogChannel],
         survey: &Survey,
     ) -> Result<Same> {
-        let now = times(name, survey)?;
         match &self.last {
             None => self.first = name.to_owned(),
             Some((last, before)) => {
