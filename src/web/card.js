@@ -20,7 +20,8 @@ const READABLE = 100;
 
 // What the others are held against: a simulator's truth, orientations in a recording.
 export const isRecorded = (id) => /(^| )recorded$/.test(id);
-export const isReference = (id) => id === "truth" || isRecorded(id);
+const isTruth = (id) => /(^|. )truth$/.test(id);
+export const isReference = (id) => isTruth(id) || isRecorded(id);
 
 export class Card {
   // does: place() is the instant of a recording that is shown ahead of its attitudes, NaN of what is live;
@@ -119,7 +120,7 @@ export class Card {
   // Which sensor it is compared with: the one chosen, or its reference.
   choose(cards) {
     const others = [...cards.keys()].filter((id) => id !== this.id);
-    const usual = [`${this.id} recorded`, "recorded", "truth"].find((id) => others.includes(id));
+    const usual = [`${this.id} recorded`, "recorded", `${this.id} truth`, "truth"].find((id) => others.includes(id));
     const wanted = this.chosen ?? (isReference(this.id) ? "" : (usual ?? ""));
     const select = this.parts.against;
     const options = ["", ...others];

@@ -146,7 +146,8 @@ export class Fleet {
     parts.fleet.hidden = this.rows.size < 3;
     if (parts.fleet.hidden || now - this.drawnAt < REDRAWN) return;
     this.drawnAt = now;
-    const truth = this.rows.get("truth");
+    const truthOf = (id) => this.rows.get(`${id} truth`) ?? this.rows.get("truth");
+    const hasTruth = [...this.rows.keys()].some((id) => /(^|. )truth$/.test(id));
     const order = this.order;
     const wanted = parts.fleetSearch.value.trim().toLowerCase();
     const silent = order.filter((each) => each.silent).length;
@@ -155,7 +156,7 @@ export class Fleet {
     parts.fleetZero.hidden = !order.some(({ row }) => row.source?.resets !== undefined && row.source?.attitude?.aided === "gravity");
     say(parts.fleetFold, `${silent} silent`);
     say(parts.fleetTitle, `${this.rows.size} sensors`);
-    parts.fleetHead.querySelector("[data-column=error]").hidden = !truth;
+    parts.fleetHead.querySelector("[data-column=error]").hidden = !hasTruth;
     for (const head of parts.fleetHead.querySelectorAll("th[data-column]")) {
       const isBy = head.dataset.column === this.by;
       head.setAttribute("aria-sort", isBy ? (this.down ? "descending" : "ascending") : "none");
@@ -167,8 +168,9 @@ export class Fleet {
       else parts.fleetBody.insertBefore(row.element, at);
       row.element.hidden = (isSilent && this.isFolded) || !plain(row.id).toLowerCase().includes(wanted);
       if (row.element.hidden) continue;
+      const truth = truthOf(row.id);
       row.error = near(row, truth) ? angleBetween(truth.q, row.q) * DEGREES : NaN;
-      row.cells.error.hidden = !truth;
+      row.cells.error.hidden = !hasTruth;
       row.element.classList.toggle("silent", isSilent);
       row.box.checked = this.does.shown(row.id);
       for (const [name, column] of Object.entries(COLUMNS)) {

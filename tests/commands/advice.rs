@@ -54,3 +54,39 @@ fn what_fails_says_what_helps() {
         &["a.txt", "the first line names the columns, or --columns"],
     );
 }
+
+/// Several simulations go into one daemon, and their lines into one file.
+#[test]
+fn a_simulated_sensor_has_the_id_it_is_given_and_its_truth_beside_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    strapd(at, "simulate coning --duration 1 --id left -o a.ndjson -q").done();
+    let text = std::fs::read_to_string(at.join("a.ndjson")).unwrap();
+    for (id, class) in [("left", "RATE"), ("left truth", "ATT")] {
+        let found = text.lines().filter(|line| {
+            let line: serde_json::Value = serde_json::from_str(line).unwrap();
+            line["id"] == id && line["class"] == class
+        });
+        assert!(found.count() > 100, "{id}");
+    }
+    // Its truth is a reference as any other simulation's.
+    let replay = "replay a.ndjson --against-recorded -o out.ndjson";
+    let ran = strapd(at, replay);
+    assert!(ran.done().out.contains("within 3 sigma"), "{ran:?}");
+    strapd(at, "compare out.ndjson a.ndjson").done();
+    for (flags, says) in [
+        ("--id x -o tcp://127.0.0.1:9?id=y", "one sensor has one id"),
+        ("-o tcp://127.0.0.1:9?id=", "1 to 255 bytes"),
+        (
+            "-o tcp://127.0.0.1:9?id=a%20truth",
+            "the truth is called so",
+        ),
+        (
+            "-o tcp://127.0.0.1:9?id=a&id=b",
+            "nothing follows the address",
+        ),
+    ] {
+        let ran = strapd(at, &format!("simulate coning --duration 1 {flags}"));
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{ran:?}");
+    }
+}

@@ -11,6 +11,23 @@ use strapd_attitude::record::Nanos;
 /// Id in lines of the true attitude of simulated samples: a reference to hold estimates against, and no sample.
 pub const TRUTH_ID: &str = "truth";
 
+/// Id of the true attitude of the sensor `id`.
+#[must_use]
+pub fn truth_of(id: &str) -> String {
+    format!("{id} {TRUTH_ID}")
+}
+
+/// Sensor whose true attitude has this id: [`TRUTH_ID`] alone is of whatever sensor there is. `None`: it is no truth's.
+#[must_use]
+pub fn sensor_of_truth(id: &str) -> Option<&str> {
+    let sensor = id.strip_suffix(TRUTH_ID)?;
+    match sensor.strip_suffix(' ') {
+        Some("") => None,
+        Some(sensor) => Some(sensor),
+        None => Some(sensor).filter(|sensor| sensor.is_empty()),
+    }
+}
+
 /// One attitude as a line says it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {

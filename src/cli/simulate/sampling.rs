@@ -4,9 +4,11 @@ use super::{Made, parameter};
 use crate::cli::known_words;
 use crate::cli::replay::CompressionArg;
 use crate::cli::serving::{Served, Serving};
+use crate::client::remote::parameters;
 use crate::config::numbers;
 use crate::error::{Error, Result};
 use crate::pipeline::simulate::Simulation;
+use crate::serve::core::reading::LineParameters;
 use crate::sink::{Format, FrameNames, Options, Target};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
@@ -15,6 +17,7 @@ use strapd_attitude::noise::sensor_error::{ImuError, StampError};
 use strapd_attitude::record::{Nanos, SampleKind};
 use strapd_bodies::field::{Disturbance, Field};
 use strapd_bodies::synthetic::{ForceSampling, Magnetometer, Sampling, Synthetic};
+use strapd_recording::attitude_line::sensor_of_truth;
 
 /// Gravity where the motion does not say otherwise: standard gravity.
 pub(super) const GRAVITY: f64 = 9.80665;
@@ -210,6 +213,10 @@ pub struct Common {
         allow_hyphen_values = true
     )]
     pub start_stamp: String,
+    /// Id of the sensor in lines, for several in one daemon; that of its truth is `NAME truth`. Of one address
+    /// tcp://HOST:PORT?id=NAME [default: imu]
+    #[arg(long, value_name = "NAME", help_heading = "Sampling", value_parser = sensor_id)]
+    pub id: Option<String>,
     /// frame_id of the sensor
     #[arg(
         long,
@@ -259,8 +266,8 @@ impl Common {
                 parameters.push(parameter("unit_bias_rad_s", text));
             }
         }
-        let targets = self
-            .outputs
+        let (outputs, id) = self.named()?;
+        let targets = outputs
             .iter()
             .map(|o| Target::parse(o))
             .collect::<Result<_>>()?;
@@ -277,6 +284,7 @@ impl Common {
             kind,
             rate_hz: self.rate_hz,
             frame_id: self.frame_id.clone(),
+            id,
             targets: served.targets.clone(),
             audience: served.audience(),
             options: Options {
@@ -292,7 +300,44 @@ impl Common {
     }
 }
 
+/// `--id`.
+fn sensor_id(text: &str) -> std::result::Result<String, String> {
+    let given = [("id".to_owned(), text.to_owned())];
+    let id = LineParameters::parse(&given)?.id.unwrap_or_default();
+    match sensor_of_truth(&id) {
+        Some(_) => Err("the truth is called so, which is sent beside it".to_owned()),
+        None => Ok(id),
+    }
+}
+
 impl Common {
+    /// The outputs without the `?id=NAME` of addresses, and the id that they or the flag give the sensor.
+    fn named(&self) -> Result<(Vec<String>, Option<String>)> {
+        let mut id = self.id.clone();
+        let mut outputs = Vec::new();
+        for output in &self.outputs {
+            let (address, query) = output.split_once('?').unwrap_or((output, ""));
+            let given = parameters(query).unwrap_or_default();
+            let value = match &given[..] {
+                [(name, value)] if name == "id" && address.starts_with("tcp://") => value,
+                _ => {
+                    outputs.push(output.clone());
+                    continue;
+                }
+            };
+            let refuse = |why: &str| Err(Error::usage(format!("-o {address}?id=..: {why}")));
+            match sensor_id(value) {
+                Err(why) => return refuse(&why),
+                Ok(other) if id.as_ref().is_some_and(|id| *id != other) => {
+                    return refuse("one sensor has one id, and another is given, too");
+                }
+                Ok(name) => id = Some(name),
+            }
+            outputs.push(address.to_owned());
+        }
+        Ok((outputs, id))
+    }
+
     /// Names and values of the sampling, as the simulation states them.
     fn parameters(&self, sampling: &Sampling) -> Vec<(String, String)> {
         let mut parameters = vec![

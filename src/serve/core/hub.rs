@@ -211,7 +211,7 @@ impl Hub {
             simulation: Simulation {
                 timeline: settings.timeline,
                 brings_samples: settings.brings_samples,
-                truth: Mutex::default(),
+                truths: Mutex::default(),
             },
             reading: Arc::new(Reading::new(&settings.decode, &settings.lines)),
             lines: settings.lines,

@@ -11,7 +11,7 @@ mod resetting;
 
 pub use heading::MeasuredHeading;
 pub use packing::{broken_packed, packed_stream, unreadable};
-pub use reference::{Reference, TRUTH, stream as reference_stream};
+pub use reference::{Reference, stream as reference_stream};
 pub use resetting::{Beginning, Reset, Sensors, posted_reset, reset_answer};
 
 use super::chunk::{Dropped, MAX_QUEUED};
@@ -23,6 +23,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::time::Duration;
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::attitude_line::sensor_of_truth;
 use strapd_recording::decode::packed::Form;
 use strapd_recording::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name};
 use strapd_recording::json_fault::JsonFault;
@@ -190,8 +191,9 @@ pub fn read_from(
         Some("HEADING") => Ok(Message::Heading(heading::read(line))),
         Some("RESET") => Ok(Message::Reset(resetting::read(line))),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback).map_err(request),
-        Some("ATT") if head.id.as_deref() == Some(TRUTH) => {
-            reference::read(line).map(|found| Message::Reference(Box::new(found)))
+        Some("ATT") if head.id.as_deref().and_then(sensor_of_truth).is_some() => {
+            let id = head.id.as_deref().unwrap_or_default();
+            reference::read(id, line).map(|found| Message::Reference(Box::new(found)))
         }
         Some("AUTH") => {
             object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")

@@ -42,6 +42,7 @@ fn simulated(noise: &str, seed: u64, path: &Path) {
         kind: SampleKind::Average,
         rate_hz: RATE_HZ,
         frame_id: "imu".to_owned(),
+        id: None,
         targets: vec![target(path)],
         options: Options {
             force: true,

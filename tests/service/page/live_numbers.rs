@@ -247,6 +247,47 @@ fn a_simulation_is_held_against_its_truth() {
 
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn several_simulations_at_once_are_each_held_against_their_own_truth() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let tcp = daemon.address(0);
+    let named = [
+        ["left leg", "--start-stamp=1700000000", "?id=left%20leg"],
+        ["right", "--start-stamp=1700000007", "?id=right"],
+    ];
+    let simulations: Vec<_> = named
+        .iter()
+        .map(|[_, start, id]| {
+            Command::new(strapd())
+                .args(["simulate", "coning", "--speed", "1", "--duration", "3"])
+                .args(["--quiet", start, "-o", &format!("tcp://{tcp}{id}")])
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap()
+        })
+        .collect();
+    for simulation in simulations {
+        let ran = simulation.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&ran.stderr);
+        assert!(ran.status.success() && said.is_empty(), "{said}");
+    }
+    for [id, ..] in named {
+        let sensor = format!("__strapd.sensors['{id}']");
+        browser.until("compared", &format!("{sensor}?.worst > 0"));
+        let against = browser.eval(&format!(
+            "document.querySelector('[data-id=\"{id}\"] [data-testid=against]').value"
+        ));
+        assert_eq!(against, format!("{id} truth"));
+        let worst = browser.number(&format!("{sensor}.worst"));
+        assert!(worst < 0.05, "{id}: {worst} deg");
+    }
+    browser.is_unharmed();
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_live_sensors_acceleration_without_gravity_is_drawn_as_it_comes() {
     let mut settings = listening(&[TCP, WS]);
     settings.hub.plan.aid = strapd_attitude::estimate::Aid::Gravity;

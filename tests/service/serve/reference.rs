@@ -56,6 +56,24 @@ fn truth_comes_beside_the_estimates_and_changes_none() {
 }
 
 #[test]
+fn there_are_no_more_truths_than_there_may_be_sensors() {
+    let mut settings = listening(&[TCP]);
+    settings.hub.limits = strapd::serve::guard::limits::Limits::of_sensors(2);
+    let daemon = Daemon::start(settings);
+    let mut one = Client::tcp(daemon.address(0));
+    for id in ["a truth", "b truth", "c truth", "a truth"] {
+        one.send(&truth(0, &q()).replace("\"truth\"", &format!("\"{id}\"")));
+    }
+    let said = one.next_of("ERROR");
+    assert_eq!(said["code"], "too_many_sensors");
+    let what = said["error"].as_str().unwrap_or_default().to_owned() + &said.to_string();
+    assert!(
+        what.contains("c truth") && what.contains("2 that may be"),
+        "{said}"
+    );
+}
+
+#[test]
 fn what_is_no_truth_is_refused() {
     let daemon = Daemon::start(listening(&[TCP]));
     let mut one = Client::tcp(daemon.address(0));
@@ -96,6 +114,17 @@ fn what_is_no_truth_is_refused() {
     );
     // Whose name no sensor can take.
     assert_eq!(refused(&mut two, &rate("truth", 0, 1.0)), "id_in_use");
+    // That of a sensor has a name of its own, and axes of its own.
+    let mut other = Client::tcp(daemon.address(0));
+    let own = |n| truth(n, &q()).replace("\"truth\"", "\"imu0 truth\"");
+    two.send(&own(1).replace("\"enu\"", "\"ned\""));
+    two.send("{\"class\":\"POLL\"}");
+    two.next_of("STATUS");
+    assert_eq!(refused(&mut other, &own(2)), "id_in_use");
+    assert_eq!(refused(&mut two, &own(2)), "bad_reference");
+    assert_eq!(refused(&mut other, &rate("imu0 truth", 0, 1.0)), "id_in_use");
+    let nobodys = own(3).replace("imu0 truth", " truth");
+    assert_eq!(refused(&mut other, &nobodys), "unknown_class");
     // After the first has gone.
     drop(one);
     let mut watcher =

@@ -7,7 +7,7 @@ use super::line_input::described;
 use super::line_reader::Key;
 use super::log_channel::LogChannel;
 use super::payload_type::PayloadType;
-use crate::attitude_line::TRUTH_ID;
+use crate::attitude_line::sensor_of_truth;
 use crate::decode::{Class, Line, Options, Rank, Role, Stated};
 use crate::delimited::Table;
 use crate::lines::Lines;
@@ -127,7 +127,7 @@ impl TextChannels {
             false => name.to_owned(),
         };
         let number = u16::try_from(index).unwrap_or(u16::MAX);
-        let is_truth = *is_attitude && id == TRUTH_ID;
+        let is_truth = *is_attitude && sensor_of_truth(id).is_some();
         let schema = Schema {
             id: number.saturating_add(1),
             name: match (self.is_table, met.class.as_str()) {

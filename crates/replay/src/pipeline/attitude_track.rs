@@ -17,7 +17,7 @@ use strapd_attitude::setting::{REF_TOPIC, TOPIC};
 use strapd_attitude::worlds::{Convention, World};
 use strapd_recording::Input;
 use strapd_recording::Recording;
-use strapd_recording::attitude_line::{Attitude, TRUTH_ID};
+use strapd_recording::attitude_line::{Attitude, sensor_of_truth};
 use strapd_recording::decode::{Options, Role};
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
@@ -299,7 +299,7 @@ fn better(before: Option<&str>, this: &str, side: Side) -> std::result::Result<B
     let Some(before) = before else {
         return Ok(Better::This);
     };
-    let wanted = |id: &str| (id == TRUTH_ID) == (side == Side::Reference);
+    let wanted = |id: &str| sensor_of_truth(id).is_some() == (side == Side::Reference);
     match (wanted(before), wanted(this)) {
         _ if before == this => Ok(Better::Same),
         (true, false) => Ok(Better::Before),

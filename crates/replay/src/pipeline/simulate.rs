@@ -11,7 +11,7 @@ use std::time::Instant;
 use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use strapd_bodies::synthetic::{Stretch, Synthetic, Truth};
-use strapd_recording::attitude_line::TRUTH_ID;
+use strapd_recording::attitude_line::{TRUTH_ID, truth_of};
 use strapd_recording::pool::Pool;
 
 /// The topic of the samples.
@@ -41,6 +41,8 @@ pub struct Simulation {
     pub rate_hz: f64,
     /// Frame.
     pub frame_id: String,
+    /// Id of the samples in lines, and beside `truth` that of the truth, instead of the usual.
+    pub id: Option<String>,
     /// Targets.
     pub targets: Vec<Target>,
     /// Options by which outputs are made.
@@ -142,7 +144,7 @@ fn streams(simulation: &Simulation) -> [Stream; 2] {
     let has_field = simulation.source.magnetometer().is_some();
     let samples = Stream {
         content: Content::Samples(simulation.kind),
-        id: ID.to_owned(),
+        id: simulation.id.clone().unwrap_or_else(|| ID.to_owned()),
         output_topic: TOPIC.to_owned(),
         field_topic: has_field.then(|| FIELD_TOPIC.to_owned()),
         world_axes: "enu".to_owned(),
@@ -150,7 +152,10 @@ fn streams(simulation: &Simulation) -> [Stream; 2] {
     };
     let truth = Stream {
         content: Content::Truth,
-        id: TRUTH_ID.to_owned(),
+        id: match &simulation.id {
+            Some(id) => truth_of(id),
+            None => TRUTH_ID.to_owned(),
+        },
         output_topic: TRUTH_TOPIC.to_owned(),
         field_topic: None,
         ..samples.clone()

@@ -8,11 +8,11 @@ use crate::serve::core::stream::run::SampleRun;
 use crate::serve::guard::fault::{Fault, Kind};
 use crate::serve::guard::peer::Origin;
 use crate::serve::protocol::foxglove;
-use crate::serve::protocol::wire::TRUTH;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use strapd_recording::text::printable;
 
 /// The time between two looks for sensors that were silent for too long.
 pub const TICK: Duration = Duration::from_millis(250);
@@ -83,12 +83,12 @@ impl Hub {
             client.sensors.fetch_add(1, Ordering::Relaxed);
             return Ok(sensor.clone());
         }
-        if id == TRUTH && lock(&self.simulation.truth).is_some() {
-            return Err(Fault::new(
-                "id_in_use",
-                "`truth` is what a simulation sends here: a sensor needs another name",
-            )
-            .of(Kind::InUse));
+        if lock(&self.simulation.truths).contains_key(id) {
+            let what = format!(
+                "`{}` is what a simulation sends here: a sensor needs another name",
+                printable(id)
+            );
+            return Err(Fault::new("id_in_use", what).of(Kind::InUse));
         }
         let mut sensors = write(&self.sensors.by_id);
         if let Some(sensor) = sensors.get(id) {

@@ -88,6 +88,6 @@ pub(super) struct Simulation {
     pub(super) timeline: Option<Arc<dyn Timeline>>,
     /// Samples can be watched, too.
     pub(super) brings_samples: bool,
-    /// True attitude by a simulation.
-    pub(super) truth: Mutex<Option<Truth>>,
+    /// True attitudes by simulations, by `id`.
+    pub(super) truths: Mutex<BTreeMap<String, Truth>>,
 }

@@ -5,8 +5,9 @@
 use super::{Client, Hub, lock, read};
 use crate::serve::core::channel::{Channel, Items};
 use crate::serve::guard::fault::Fault;
-use crate::serve::protocol::wire::{self, Reference, TRUTH};
+use crate::serve::protocol::wire::{self, Reference};
 use std::sync::Arc;
+use strapd_recording::text::printable;
 
 /// The truth there is.
 #[derive(Debug)]
@@ -19,36 +20,39 @@ pub(super) struct Truth {
 }
 
 impl Hub {
-    /// Passes on what truly was, of one client at a time.
+    /// Passes on what truly was, of each `id` of one client at a time.
     ///
     /// # Errors
-    /// `id_in_use`: another client sends it, or a sensor is called so; `bad_reference`: of other axes than before.
+    /// `id_in_use`: another client sends it, or a sensor is called so; `bad_reference`: of other axes than before;
+    /// `too_many_sensors`: there are as many as there may be sensors.
     pub fn refer(&self, client: u64, found: &Reference, text: &mut Vec<u8>) -> Result<(), Fault> {
-        if read(&self.sensors.by_id).contains_key(TRUTH) {
-            return Err(Fault::new(
-                "id_in_use",
-                "a sensor is called `truth`: its attitude is estimated, and no reference",
-            ));
+        let id = &found.id;
+        let refuse = |code: &'static str, why: String| {
+            Err(Fault::new(code, format!("`{}` {why}", printable(id))))
+        };
+        if read(&self.sensors.by_id).contains_key(id.as_str()) {
+            let why = "is a sensor here: its attitude is estimated, and no reference";
+            return refuse("id_in_use", why.to_owned());
         }
-        let mut truth = lock(&self.simulation.truth);
-        let truth = truth.get_or_insert_with(|| Truth {
-            channel: self.declare(&wire::reference_stream(found.world, found.body)),
+        let mut truths = lock(&self.simulation.truths);
+        if truths.len() >= self.limits.sensors && !truths.contains_key(id) {
+            let why = format!("is one truth more than the {} that may be", truths.len());
+            return refuse("too_many_sensors", why);
+        }
+        let truth = truths.entry(id.clone()).or_insert_with(|| Truth {
+            channel: self.declare(&wire::reference_stream(found)),
             next: 0,
             owner: None,
         });
         if truth.owner.is_some_and(|owner| owner != client) {
-            return Err(Fault::new("id_in_use", "another client sends `truth`"));
+            return refuse("id_in_use", "is sent by another client".to_owned());
         }
         truth.owner = Some(client);
         let stream = truth.channel.stream();
         if stream.world_axes != found.world.to_string() || stream.body_axes != found.body {
-            return Err(Fault::new(
-                "bad_reference",
-                format!(
-                    "`truth` is of {} in {} here, until the daemon is started again",
-                    stream.body_axes, stream.world_axes
-                ),
-            ));
+            let (body, world) = (&stream.body_axes, &stream.world_axes);
+            let why = format!("is of {body} in {world} here, until the daemon is started again");
+            return refuse("bad_reference", why);
         }
         let first = truth.next;
         truth.next += 1;
@@ -61,12 +65,10 @@ impl Hub {
         Ok(())
     }
 
-    /// Lets others send the truth that this client has sent.
+    /// Lets others send the truths that this client has sent.
     pub(super) fn give_truth_back(&self, client: &Client) {
-        if let Some(truth) = &mut *lock(&self.simulation.truth)
-            && truth.owner == Some(client.number)
-        {
-            truth.owner = None;
+        for truth in lock(&self.simulation.truths).values_mut() {
+            truth.owner = truth.owner.filter(|owner| *owner != client.number);
         }
     }
 }

@@ -8,9 +8,7 @@ use std::collections::BTreeMap;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd_attitude::worlds::World;
-
-/// The only `id` it may have.
-pub const TRUTH: &str = "truth";
+use strapd_recording::attitude_line::sensor_of_truth;
 
 /// Example of what is expected.
 const EXPECTED: &str = "{\"class\":\"ATT\",\"id\":\"truth\",\"stamp\":{\"sec\":1,\"nsec\":0},\"q\":{\"w\":1,\"x\":0,\"y\":0,\"z\":0},\"world\":\"enu\",\"body\":\"flu\"}";
@@ -18,6 +16,8 @@ const EXPECTED: &str = "{\"class\":\"ATT\",\"id\":\"truth\",\"stamp\":{\"sec\":1
 /// One attitude, and what it is of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
+    /// Its `id`: `truth`, or that of a sensor and `truth` behind it.
+    pub id: String,
     /// World from whose axes it comes.
     pub world: World,
     /// Body axes to which it leads.
@@ -42,7 +42,7 @@ struct ReferenceObject {
 ///
 /// # Errors
 /// `bad_reference`, in words.
-pub(super) fn read(line: &[u8]) -> Result<Reference, Fault> {
+pub(super) fn read(id: &str, line: &[u8]) -> Result<Reference, Fault> {
     const CODE: &str = "bad_reference";
     let said: ReferenceObject = object(line, CODE, EXPECTED)?;
     let wrong = |what: &str| Fault::new(CODE, format!("{what}; expected {EXPECTED}"));
@@ -63,6 +63,7 @@ pub(super) fn read(line: &[u8]) -> Result<Reference, Fault> {
     let nothing = [f64::NAN; 3];
     let rate = said.rate.filter(|rate| rate.iter().all(|v| v.is_finite()));
     Ok(Reference {
+        id: id.to_owned(),
         world,
         body,
         sample: AttitudeSample {
@@ -79,15 +80,19 @@ pub(super) fn read(line: &[u8]) -> Result<Reference, Fault> {
     })
 }
 
-/// The stream of all of them.
+/// The stream of those with its `id`.
 #[must_use]
-pub fn stream(world: World, body: &str) -> Stream {
+pub fn stream(of: &Reference) -> Stream {
+    let topic = match sensor_of_truth(&of.id) {
+        None | Some("") => "/truth".to_owned(),
+        Some(sensor) => format!("{}/truth", sensor.trim_end_matches('/')),
+    };
     Stream {
         content: Content::Truth,
-        id: TRUTH.to_owned(),
-        output_topic: "/truth".to_owned(),
-        world_axes: world.to_string(),
-        body_axes: body.to_owned(),
-        ..Stream::new("/truth", TRUTH)
+        id: of.id.clone(),
+        output_topic: topic.clone(),
+        world_axes: of.world.to_string(),
+        body_axes: of.body.to_owned(),
+        ..Stream::new(&topic, &of.id)
     }
 }
