@@ -8,6 +8,7 @@ import { plain, say, show } from "./numbers.js";
 import { drawPlot } from "./plot.js";
 import { aboutZ, DEGREES, product, rollPitchYaw, rotate } from "./quaternion.js";
 import { Scale } from "./scale.js";
+import { isRecorded, isReference } from "./sensor.js";
 import { Surface } from "./surface.js";
 import { writeDoubts, writeHealth, writeNumbers } from "./writing.js";
 
@@ -17,11 +18,6 @@ const LOCUS = 10;
 const PLOTS = ["errors", "angles", "rates", "accelerations"];
 // Milliseconds between two changes of the numbers: faster nobody reads.
 const READABLE = 100;
-
-// What the others are held against: a simulator's truth, orientations in a recording.
-export const isRecorded = (id) => /(^| )recorded$/.test(id);
-const isTruth = (id) => /(^|. )truth$/.test(id);
-export const isReference = (id) => isTruth(id) || isRecorded(id);
 
 export class Card {
   // does: place() is the instant of a recording that is shown ahead of its attitudes, NaN of what is live;

@@ -1,7 +1,7 @@
 // The sensors that are drawn: which, in which order, and which are folded.
 
-import { Card, isRecorded, isReference } from "./card.js";
-import { Sensor } from "./sensor.js";
+import { Card } from "./card.js";
+import { isRecorded, isReference, Sensor } from "./sensor.js";
 
 // As many as two screens hold.
 const MOST = 8;

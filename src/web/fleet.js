@@ -1,11 +1,14 @@
 // All sensors in a table: sorted by any column, who is silent last. From STATUS, and a few attitudes a second.
 
+import { secondsBetween } from "./clock.js";
 import { fixed, meaning, plain, say, sigma, whole } from "./numbers.js";
 import { Twice } from "./known.js";
-import { angleBetween, DEGREES, rollPitchYaw } from "./quaternion.js";
-import { taken } from "./sensor.js";
+import { aligned, angleBetween, DEGREES, product, rollPitchYaw, turned } from "./quaternion.js";
+import { isTruth, taken } from "./sensor.js";
 
 const REDRAWN = 500;
+// Seconds between two attitudes that are held against each other.
+const NEAR = 0.02;
 // No more digits than the sigma of the row leaves, and no more than `most`.
 const degrees = (of, most) => ({ of, say: (value, row) => fixed(value, Math.min(most, meaning(row.sigma))) });
 const count = (of) => ({ of, say: (value) => (value === undefined ? "–" : whole(value)), isCount: true });
@@ -49,12 +52,23 @@ class Row {
   hear(att, now) {
     const { q, rate, sigma_deg } = att;
     if (!q) return;
-    this.q = q;
-    [this.stamp, this.world] = [att.stamp, att.world];
+    if (att.reset !== this.reset || att.world !== this.world) this.turn = null;
+    [this.q, this.angular] = [q, rate];
+    [this.stamp, this.world, this.reset] = [att.stamp, att.world, att.reset];
     this.angles = rollPitchYaw(q);
     this.speed = rate ? Math.hypot(...rate) * DEGREES : NaN;
     this.sigma = sigma_deg ? Math.hypot(...sigma_deg) : NaN;
     if (!att.status?.includes("last")) this.heardAt = now;
+  }
+
+  // Error angle to a truth, degrees; worlds of two names agree where both are known first.
+  errorTo(truth) {
+    if (!this.q || !truth?.q || this === truth) return NaN;
+    const seconds = secondsBetween(truth.stamp, this.stamp);
+    if (Math.abs(seconds) > NEAR) return NaN;
+    const then = truth.angular ? turned(truth.q, truth.angular, seconds) : truth.q;
+    this.turn ??= aligned(this.world, this.q, truth.world, then);
+    return angleBetween(product(this.turn, then), this.q) * DEGREES;
   }
 
   // Seconds since an attitude came.
@@ -125,12 +139,21 @@ export class Fleet {
     this.draw(performance.now());
   }
 
+  // Rows but those of references that belong to one of the others: they are in its error, and in its card.
+  get own() {
+    const isOwn = (row) => {
+      const [, of] = /^(.+) (?:truth|recorded)$/.exec(row.id) ?? [];
+      return !this.rows.has(of);
+    };
+    return [...this.rows.values()].filter(isOwn);
+  }
+
   get order() {
     const now = performance.now();
     const { of } = COLUMNS[this.by];
     const sense = this.down ? -1 : 1;
     const isNothing = (value) => value === undefined || Number.isNaN(value);
-    const keyed = [...this.rows.values()].map((row) => ({ row, value: of(row, now), silent: this.does.isSilent(row) }));
+    const keyed = this.own.map((row) => ({ row, value: of(row, now), silent: this.does.isSilent(row) }));
     return keyed.sort((a, b) => {
       if (a.silent !== b.silent) return a.silent - b.silent;
       if (isNothing(a.value) !== isNothing(b.value)) return isNothing(a.value) - isNothing(b.value);
@@ -143,11 +166,12 @@ export class Fleet {
   draw(now) {
     const { parts } = this;
     // Of one sensor, or a sensor and its truth, there is nothing to compare in a table.
-    parts.fleet.hidden = this.rows.size < 3;
+    const own = new Set(this.own);
+    parts.fleet.hidden = own.size < 3;
     if (parts.fleet.hidden || now - this.drawnAt < REDRAWN) return;
     this.drawnAt = now;
     const truthOf = (id) => this.rows.get(`${id} truth`) ?? this.rows.get("truth");
-    const hasTruth = [...this.rows.keys()].some((id) => /(^|. )truth$/.test(id));
+    const hasTruth = [...this.rows.keys()].some(isTruth);
     const order = this.order;
     const wanted = parts.fleetSearch.value.trim().toLowerCase();
     const silent = order.filter((each) => each.silent).length;
@@ -155,12 +179,13 @@ export class Fleet {
     parts.fleetFold.setAttribute("aria-expanded", String(!this.isFolded));
     parts.fleetZero.hidden = !order.some(({ row }) => row.source?.resets !== undefined && row.source?.attitude?.aided === "gravity");
     say(parts.fleetFold, `${silent} silent`);
-    say(parts.fleetTitle, `${this.rows.size} sensors`);
+    say(parts.fleetTitle, `${own.size} sensors`);
     parts.fleetHead.querySelector("[data-column=error]").hidden = !hasTruth;
     for (const head of parts.fleetHead.querySelectorAll("th[data-column]")) {
       const isBy = head.dataset.column === this.by;
       head.setAttribute("aria-sort", isBy ? (this.down ? "descending" : "ascending") : "none");
     }
+    for (const row of this.rows.values()) if (!own.has(row)) row.element.remove();
     let at = parts.fleetBody.firstElementChild;
     for (const { row, silent: isSilent } of order) {
       // Moved where it must be, and only then: a focus is not lost.
@@ -168,8 +193,7 @@ export class Fleet {
       else parts.fleetBody.insertBefore(row.element, at);
       row.element.hidden = (isSilent && this.isFolded) || !plain(row.id).toLowerCase().includes(wanted);
       if (row.element.hidden) continue;
-      const truth = truthOf(row.id);
-      row.error = near(row, truth) ? angleBetween(truth.q, row.q) * DEGREES : NaN;
+      row.error = row.errorTo(truthOf(row.id));
       row.cells.error.hidden = !hasTruth;
       row.element.classList.toggle("silent", isSilent);
       row.box.checked = this.does.shown(row.id);
@@ -180,11 +204,4 @@ export class Fleet {
       }
     }
   }
-}
-
-// Attitudes that may be held against each other as they are: of one world, within 20 ms.
-function near(row, truth) {
-  if (!row.q || !truth?.q || row === truth || row.world !== truth.world) return false;
-  const [a, b] = [row.stamp, truth.stamp];
-  return Math.abs(a.sec - b.sec + (a.nsec - b.nsec) * 1e-9) < 0.02;
 }

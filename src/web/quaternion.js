@@ -44,6 +44,23 @@ export function aboutZ(angle) {
   return { w: Math.cos(angle / 2), x: 0, y: 0, z: Math.sin(angle / 2) };
 }
 
+// Attitude `seconds` later at the body rate [x, y, z], rad/s.
+export function turned(q, rate, seconds) {
+  const half = (Math.hypot(...rate) * seconds) / 2;
+  const part = Math.abs(half) > 1e-9 ? (Math.sin(half) / half) * (seconds / 2) : seconds / 2;
+  return product(q, { w: Math.cos(half), x: rate[0] * part, y: rate[1] * part, z: rate[2] * part });
+}
+
+// Turns another's world into one's own. Worlds of one name are one; else they agree now, in heading only where both
+// are level.
+export function aligned(ownWorld, own, world, other) {
+  if (ownWorld === world) return { w: 1, x: 0, y: 0, z: 0 };
+  const whole = product(own, conjugate(other));
+  const norm = Math.hypot(whole.w, whole.z);
+  const isLevel = ownWorld !== "start" && world !== "start" && (ownWorld === "ned") === (world === "ned");
+  return isLevel && norm > 1e-6 ? { w: whole.w / norm, x: 0, y: 0, z: whole.z / norm } : whole;
+}
+
 // Angle of the rotation from a to b, exact down to zero.
 export function angleBetween(a, b) {
   const d = product(conjugate(a), b);

@@ -2,7 +2,7 @@
 
 import { secondsBetween } from "./clock.js";
 import { History } from "./history.js";
-import { angleBetween, conjugate, DEGREES, product } from "./quaternion.js";
+import { aligned, angleBetween, DEGREES, product } from "./quaternion.js";
 
 // Steps of stamps that jitter is judged by.
 const STEPS = 512;
@@ -14,15 +14,10 @@ const SILENCE = 5000;
 // Samples so far, of a recording what was shown: those passed over on the way to another place did not come.
 export const taken = (source) => source.sent ?? source.samples ?? 0;
 
-// What turns another's world into one's own. Worlds of one name are one; else they agree at the first instant of both,
-// in heading only where both are level.
-function aligned(ownWorld, own, world, other) {
-  if (ownWorld === world) return { w: 1, x: 0, y: 0, z: 0 };
-  const whole = product(own, conjugate(other));
-  const norm = Math.hypot(whole.w, whole.z);
-  const isLevel = ownWorld !== "start" && world !== "start" && (ownWorld === "ned") === (world === "ned");
-  return isLevel && norm > 1e-6 ? { w: whole.w / norm, x: 0, y: 0, z: whole.z / norm } : whole;
-}
+// What the others are held against: a simulator's truth, orientations in a recording.
+export const isTruth = (id) => /(^|. )truth$/.test(id);
+export const isRecorded = (id) => /(^| )recorded$/.test(id);
+export const isReference = (id) => isTruth(id) || isRecorded(id);
 
 export class Sensor {
   constructor(id, clocks) {

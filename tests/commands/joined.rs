@@ -213,7 +213,7 @@ fn who_gives_files_that_continue_each_other_is_told_once_of_the_flag() {
     assert!(!ran.done().err.contains("goes on"), "{ran:?}");
 }
 
-/// What a recorder leaves that is killed as it begins its next file.
+/// Rest of a recorder that was killed as it began its next file.
 #[test]
 fn a_part_that_holds_nothing_is_left_out_with_a_word() {
     let dir = tempfile::tempdir().unwrap();

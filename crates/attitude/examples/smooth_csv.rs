@@ -57,6 +57,7 @@ fn read(path: &str, has_field: bool, cut: Cut) -> Result<Recording, Failure> {
             rate: BodyRate([g0, g1, g2].into()),
             force: Some(In::assume([a0, a1, a2].into())),
             field: is_field.then(|| In::assume(field)),
+            is_saturated: false,
         };
         rows.push((sample, (scored > 0.5).then_some([w, x, y, z])));
     }

@@ -51,6 +51,7 @@ impl Samples for Made {
                 field: self
                     .has_field
                     .then(|| In::assume(to_body * Vector3::new(0.0, 18.0, -45.0))),
+                is_saturated: false,
             });
             if chunk.len() == 4096 {
                 take(&chunk);

@@ -154,6 +154,9 @@ struct State {
     /// Nanoseconds by which the stamp clock was set so far, and the last time.
     #[cfg_attr(feature = "serde", serde(default))]
     set: (i64, i64),
+    /// Ends of the gyro's range that nobody states, where no sample waits.
+    #[cfg_attr(feature = "serde", serde(default))]
+    rails: Option<Rails>,
 }
 
 impl Conditioner {
@@ -215,7 +218,10 @@ impl Conditioner {
                 && settings.has_arrival
                 && matches!(settings.clock, Clock::Header),
             zero: None,
-            state: State::default(),
+            state: State {
+                rails: (is_rate && window == 0 && settings.gyro_range.is_none()).then(Rails::new),
+                ..State::default()
+            },
             report: Report::of_batches(settings.batches.filter(|_| window == 0)),
         })
     }
@@ -328,6 +334,11 @@ impl Conditioner {
         let spacing = self.timing.spacing();
         match self.gate.pass(raw, stamp, index, spacing) {
             Ok(mut entry) => {
+                if let (Some(rails), Some(gyro)) = (&mut self.state.rails, &raw.gyro)
+                    && rails.push_and_judge(gyro, self.gate.rad())
+                {
+                    entry.status = entry.status.with(Status::SATURATED);
+                }
                 if self.state.rejected {
                     self.state.rejected = false;
                     entry.status = entry.status.with(Status::REJECTED_BEFORE);

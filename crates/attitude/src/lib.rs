@@ -58,6 +58,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod aid;
+mod clipped_run;
 pub mod compare;
 pub mod condition;
 pub mod consistency;

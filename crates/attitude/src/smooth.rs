@@ -38,6 +38,7 @@
 //!         rate: BodyRate([0.01, 0.0, 0.0].into()),
 //!         force: Some(In::assume([0.0, 9.81 * 0.1_f64.sin(), 9.81 * 0.1_f64.cos()].into())),
 //!         field: None,
+//!         is_saturated: false,
 //!     })
 //!     .collect();
 //! let smoothed = smooth(&mut samples.as_slice(), &Settings::default())?;

@@ -288,6 +288,45 @@ fn several_simulations_at_once_are_each_held_against_their_own_truth() {
 
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn the_table_holds_levelled_sensors_against_their_truth() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let names = ["foot", "knee", "hip"];
+    let simulations: Vec<_> = names
+        .iter()
+        .map(|name| {
+            Command::new(strapd())
+                .args(["simulate", "hand", "--speed", "1", "--duration", "6"])
+                .args(["--noise", "consumer_imu", "--rate-hz", "100", "--quiet"])
+                .args(["-o", &format!("tcp://{}?id={name}", daemon.address(0))])
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap()
+        })
+        .collect();
+    let rows = "[...document.querySelectorAll('[data-testid=fleet-table] tbody tr')]";
+    let errors =
+        format!("{rows}.map((e) => Number(e.querySelector('[data-cell=error]').textContent))");
+    browser.until(
+        "each has an error",
+        &format!("{errors}.length === 3 && {errors}.every((e) => e > 0 && e < 20)"),
+    );
+    let shown = browser.eval(&format!(
+        "{rows}.map((e) => e.dataset.sensor).sort().join()"
+    ));
+    assert_eq!(shown, "foot,hip,knee");
+    assert!(browser.text("fleet").starts_with("3 sensors"));
+    for simulation in simulations {
+        let ran = simulation.wait_with_output().unwrap();
+        assert!(ran.status.success());
+    }
+    browser.is_unharmed();
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_live_sensors_acceleration_without_gravity_is_drawn_as_it_comes() {
     let mut settings = listening(&[TCP, WS]);
     settings.hub.plan.aid = strapd_attitude::estimate::Aid::Gravity;

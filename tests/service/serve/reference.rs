@@ -122,7 +122,10 @@ fn what_is_no_truth_is_refused() {
     two.next_of("STATUS");
     assert_eq!(refused(&mut other, &own(2)), "id_in_use");
     assert_eq!(refused(&mut two, &own(2)), "bad_reference");
-    assert_eq!(refused(&mut other, &rate("imu0 truth", 0, 1.0)), "id_in_use");
+    assert_eq!(
+        refused(&mut other, &rate("imu0 truth", 0, 1.0)),
+        "id_in_use"
+    );
     let nobodys = own(3).replace("imu0 truth", " truth");
     assert_eq!(refused(&mut other, &nobodys), "unknown_class");
     // After the first has gone.

@@ -392,6 +392,7 @@ impl AidedPropagator {
                 rate,
                 force,
                 field,
+                is_saturated: sample.status.has(Status::SATURATED),
             },
             applied,
             join: sample.join,

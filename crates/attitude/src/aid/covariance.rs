@@ -149,6 +149,16 @@ impl Covariance {
         }
     }
 
+    /// More is unknown of the rotation about this axis of the world, unit or longer.
+    pub(super) fn add_about(&mut self, axis: &Vector3<f64>, variance: f64) {
+        let about = variance * axis * axis.transpose();
+        for i in 0..3 {
+            for j in 0..3 {
+                self.rows[i][j] += about[(i, j)];
+            }
+        }
+    }
+
     /// A state known to `variance`, and with no other in common.
     pub(super) fn restart(&mut self, state: usize, variance: f64) {
         for other in 0..self.states {

@@ -38,6 +38,9 @@ pub(crate) struct Measured {
     pub force: Option<Vector3<f64>>,
     /// Magnetic field at the instant, any linear unit, body axes. One that was measured only once comes once.
     pub field: Option<Vector3<f64>>,
+    /// Whether the gyro was at the end of its range.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub is_saturated: bool,
 }
 
 /// Counts of what happened.
@@ -385,7 +388,7 @@ impl Filter {
         self.state
             .rest
             .take(secs, &rate, force.as_ref(), bias, &self.settings);
-        self.doubt_turn(sample, is_gap);
+        self.doubt_turn(sample, is_gap, r);
         self.state.last_rate = sample.rate;
         if !is_gap {
             self.state.gaps_in_a_row = 0;
@@ -470,7 +473,7 @@ impl Filter {
     }
 
     /// Adds what a gap, a jump or the end of the gyro's range leaves unknown of a rotation.
-    fn doubt_turn(&mut self, sample: &Measured, is_gap: bool) {
+    fn doubt_turn(&mut self, sample: &Measured, is_gap: bool, r: &Matrix3<f64>) {
         let secs = sample.secs;
         let jump = sample.rate - self.state.last_rate;
         if is_gap {
@@ -495,14 +498,14 @@ impl Filter {
                 .covariance
                 .add_to_attitude((excess * secs).powi(2));
         }
-        let range = self.settings.gyro_range;
-        if range > 0.0 && sample.rate.amax() >= range {
-            self.state.report.saturated += 1;
-            for rate in sample.rate.iter().filter(|rate| rate.abs() >= range) {
-                self.state
-                    .covariance
-                    .add_to_attitude((0.5 * rate * secs).powi(2));
-            }
+        self.state.report.saturated += u64::from(sample.is_saturated);
+        let unknown =
+            self.state
+                .clipped
+                .add(sample.is_saturated, &sample.rate, jump.norm_squared(), secs);
+        for (axis, variance) in unknown.iter().enumerate().filter(|(_, v)| **v > 0.0) {
+            let axis = r.column(axis).into_owned();
+            self.state.covariance.add_about(&axis, *variance);
         }
     }
 

@@ -103,6 +103,7 @@ impl Memory {
             && filter.residuals.is_plausible()
             && filter.surroundings.is_plausible()
             && filter.plausibility.is_plausible()
+            && filter.clipped.is_plausible()
             && stream.given.len() <= MOST_GIVEN
             && filter.rest.is_bounded()
             && filter.vertical.is_plausible()
@@ -266,7 +267,7 @@ mod tests {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..50);
         let (propagation, memory) = whole.memory().unwrap();
-        let of_filter = "calibration class_log correction covariance disturbance drift fields forces gaps_in_a_row given interval \
+        let of_filter = "calibration class_log clipped correction covariance disturbance drift fields forces gaps_in_a_row given interval \
                          is_started is_widened last last_force last_out last_rate last_up mean_acceleration nominal \
                          plausibility position report residuals rest since_force surroundings usual_length velocity vertical \
                          wants_level world";

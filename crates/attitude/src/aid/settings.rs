@@ -122,8 +122,6 @@ pub struct Settings {
     pub gap_factor: f64,
     /// Length of a gap beyond which nothing is known, s.
     pub gap_secs: f64,
-    /// The gyro's range, rad/s; at it, the turn is unknown. 0: not known.
-    pub gyro_range: f64,
     /// Delay of the sensor's own filters that nobody has taken out, s.
     pub delay: f64,
     /// Misalignment of the axes of the sensor and of its case, rad.
@@ -188,7 +186,6 @@ impl Default for Settings {
             jerk: 1000.0,
             gap_factor: 1.5,
             gap_secs: 0.2,
-            gyro_range: 0.0,
             delay: 2e-3,
             case: 3.5e-3,
             prior: Prior::default(),

@@ -14,6 +14,7 @@ use super::residuals::Residuals;
 use super::rest::Rest;
 use super::surroundings::Surroundings;
 use super::vertical::Vertical;
+use crate::clipped_run::ClippedRun;
 use crate::frames::Nav;
 use crate::quaternion::Quaternion;
 use nalgebra::Vector3;
@@ -59,6 +60,9 @@ pub(super) struct State {
     pub(super) last_force: Option<Vector3<f64>>,
     pub(super) since_force: f64,
     pub(super) plausibility: Plausibility,
+    /// Samples at the end of the gyro's range, up to now.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) clipped: ClippedRun,
     /// Whether the gyro was found to be none of its class, and its scale and axes are looked for farther off.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(super) is_widened: bool,

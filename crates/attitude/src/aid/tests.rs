@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod clipped;
 mod drift;
 mod golden;
 mod iron;

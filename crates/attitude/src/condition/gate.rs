@@ -105,12 +105,15 @@ pub(super) struct Gate {
     cut: Option<Vector3<f64>>,
     huge: f64,
     range: f64,
+    /// Recorded rates of one rad/s, by axis as recorded.
+    rad: [f64; 3],
 }
 
 impl Gate {
     pub(super) fn new(settings: &Settings) -> Self {
         let axes = settings.mount.as_matrix() * settings.axes.matrix();
         let to_rad = Vector3::from(settings.gyro_scale) * settings.unit.to_rad();
+        let rad = to_rad.map(|to_rad| to_rad.recip().abs()).into();
         let scale = Matrix3::from_diagonal(&Vector3::from(settings.gyro_scale));
         let unless_identity = |m: Matrix3<f64>| (m != Matrix3::identity()).then_some(m);
         Gate {
@@ -119,6 +122,7 @@ impl Gate {
             accel: unless_identity(axes * settings.accel_matrix * settings.accel_scale),
             accel_bias: axes * settings.accel_bias,
             to_rad,
+            rad,
             cut: settings
                 .truncation_step
                 .map(|step| to_rad.map(|to_rad| step / to_rad)),
@@ -131,6 +135,10 @@ impl Gate {
                 .gyro_range
                 .map_or(f64::INFINITY, |r| r * (1.0 - 1e-6)),
         }
+    }
+
+    pub(super) fn rad(&self) -> &[f64; 3] {
+        &self.rad
     }
 
     /// The sample in SI and body axes, or why it cannot be used. `spacing` is the ordinary step,

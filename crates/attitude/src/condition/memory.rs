@@ -5,6 +5,7 @@
 
 use super::clock::IndexClock;
 use super::gate::{Entry, HUGE_RATE, MAX_STAMP};
+use super::rails::Rails;
 use super::spacing::Steps;
 use super::timing::Previous;
 use super::{Conditioner, Report, State, order};
@@ -51,6 +52,7 @@ impl Memory {
         let entries = || order.suspects.iter().chain(&self.untimed);
         self.state.turns.is_plausible()
             && self.state.against_arrival.is_plausible()
+            && self.state.rails.iter().all(Rails::is_plausible)
             && [self.state.set.0, self.state.set.1]
                 .iter()
                 .all(|set| (-MAX_STAMP..=MAX_STAMP).contains(set))
@@ -114,7 +116,10 @@ impl Conditioner {
         if let (Some(clock), Some(base)) = (&mut self.index_clock, memory.index_base) {
             clock.count_from(base);
         }
+        let rails = self.state.rails.take();
         self.state = memory.state.clone();
+        // A file may be older than these.
+        self.state.rails = rails.map(|fresh| memory.state.rails.unwrap_or(fresh));
         self.zero = None;
         self.primed = true;
         self.hold = self.window;
@@ -161,6 +166,7 @@ impl Conditioner {
 mod tests {
     use super::*;
     use crate::condition::Settings;
+    use crate::record::{RateSample, Status};
 
     #[test]
     fn what_is_remembered_goes_on_to_the_bit_and_the_keys_of_a_state_file_stay() {
@@ -201,10 +207,52 @@ mod tests {
             );
 
             let keys: Vec<&String> = text.as_object().unwrap().keys().collect();
-            let all = "against_arrival epoch first floor high index index_base last previous rejected set steps \
+            let all = "against_arrival epoch first floor high index index_base last previous rails rejected set steps \
                        suspects trimmed_from turns untimed";
             assert_eq!(keys, all.split_whitespace().collect::<Vec<_>>());
             text["of_a_later_release"] = 1.into();
+            assert!(serde_json::from_value::<Memory>(text).is_err());
+        }
+    }
+
+    #[test]
+    fn the_end_of_a_range_that_was_found_is_remembered() {
+        let raw = |n: i64| {
+            let shaken = 1e-3 * (n * 7919 % 1009) as f64 / 1009.0;
+            let swing = 3.0 * (0.01 * (n - 30).max(0) as f64).sin() + shaken;
+            RawSample {
+                header: Some(Nanos(1 + 1_000_000 * n)),
+                gyro: Some([swing.clamp(-2.0, 2.0), 1e-3 * n as f64, 0.2]),
+                ..RawSample::default()
+            }
+        };
+        let settings = Settings {
+            reorder_window: 0,
+            ..Settings::default()
+        };
+        let fresh = || Conditioner::new(&settings).unwrap();
+        for cut in [40, 75, 300, 420, 900] {
+            let (mut whole, mut other, mut older) = (fresh(), fresh(), fresh());
+            let fed = |conditioner: &mut Conditioner, samples: std::ops::Range<i64>| {
+                let mut out = Vec::new();
+                conditioner.push(&samples.map(raw).collect::<Vec<_>>(), &mut out);
+                out
+            };
+            let _ = fed(&mut whole, 0..cut);
+            let mut text = serde_json::to_value(whole.memory().unwrap()).unwrap();
+            assert!(other.recall(&serde_json::from_value(text.clone()).unwrap()));
+            // A file of an older release has none: they are found anew.
+            text.as_object_mut().unwrap().remove("rails");
+            assert!(older.recall(&serde_json::from_value(text.clone()).unwrap()));
+            assert!(older.state.rails.is_some());
+            let next = fed(&mut whole, cut..1500);
+            assert_eq!(fed(&mut other, cut..1500), next, "{cut}");
+            let count = |out: &[RateSample]| {
+                let is_saturated = |s: &&RateSample| s.status.has(Status::SATURATED);
+                out.iter().filter(is_saturated).count()
+            };
+            assert!(count(&next) > 100);
+            text["rails"] = serde_json::json!({"axes": []});
             assert!(serde_json::from_value::<Memory>(text).is_err());
         }
     }

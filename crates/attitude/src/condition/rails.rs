@@ -1,9 +1,11 @@
 //! Rates of one topic -> axes that were clipped. Pure.
 //!
-//! A stage of its own because two judge by it: `check` as recorded, and a replay before its first sample, which then
-//! treats the samples at that level as it does those at a stated range. An axis is clipped where it stays at exactly
+//! A stage of its own because three judge by it: `check` as recorded, a replay before its first sample, which then
+//! treats the samples at that level as it does those at a stated range, and a live stream as it goes. An axis is clipped where it stays at exactly
 //! its largest reading while another axis moves, and jumps onto that level and off it; the smooth top of a coarsely
 //! quantised swing has jumps of one step. `docs/theory/spikes.md` has the numbers.
+
+use crate::plausible::are_numbers;
 
 /// Samples in a row at the largest reading, while another axis changes.
 const RUN: u64 = 4;
@@ -13,6 +15,8 @@ const STEPS: f64 = 4.0;
 const KEPT: usize = 32;
 /// Level, rad/s, above which a gyro can be clipped.
 const FLOOR: f64 = 1.0;
+/// Share of the level that counts as it: what a bias leaves of it is at the range, too.
+pub(crate) const AT_RANGE: f64 = 0.999;
 
 /// End of a gyro's range that an axis was clipped at.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -24,30 +28,34 @@ pub struct Clipped {
 }
 
 /// One direction of one axis.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Side {
     sign: f64,
-    /// Largest reading so far, samples at it, the run of them under way, and the longest.
+    /// Largest reading so far, 0 before the first beyond it, samples at it, the run of them under way, and the longest.
     peak: f64,
     samples: u64,
     run: u64,
     longest: u64,
     /// The newest jumps onto and off that level.
+    #[cfg_attr(feature = "serde", serde(with = "jumps"))]
     jumps: [f64; KEPT],
     count: usize,
 }
 
 /// Readings of one axis.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Axis {
     sides: [Side; 2],
     last: Option<f64>,
     /// Smallest change so far.
-    quantum: f64,
+    quantum: Option<f64>,
 }
 
 /// Readings of three axes of a gyro, or of a magnetometer, in the unit of the source.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Rails {
     axes: [Axis; 3],
 }
@@ -64,7 +72,7 @@ impl Rails {
     pub fn new() -> Rails {
         let side = |sign| Side {
             sign,
-            peak: f64::NEG_INFINITY,
+            peak: 0.0,
             samples: 0,
             run: 0,
             longest: 0,
@@ -75,7 +83,7 @@ impl Rails {
             axes: [Axis {
                 sides: [side(1.0), side(-1.0)],
                 last: None,
-                quantum: f64::INFINITY,
+                quantum: None,
             }; 3],
         }
     }
@@ -94,6 +102,27 @@ impl Rails {
         for ((axis, rate), other) in self.axes.iter_mut().zip(gyro).zip(others) {
             axis.push(*rate, other);
         }
+    }
+
+    /// Takes the next readings, and says whether one of them is at an end of the range, as far as that is known by now;
+    /// `rad` in the source's unit is one rad/s.
+    #[inline]
+    pub(crate) fn push_and_judge(&mut self, gyro: &[f64; 3], rad: &[f64; 3]) -> bool {
+        self.push(gyro);
+        let mut axes = self.axes.iter().zip(gyro.iter().zip(rad));
+        axes.any(|(axis, (rate, rad))| {
+            let at = |side: &&Side| rate * side.sign >= AT_RANGE * side.peak;
+            let mut near = axis.sides.iter().filter(at);
+            near.any(|side| side.is_clipped(axis.quantum, *rad))
+        })
+    }
+
+    pub(super) fn is_plausible(&self) -> bool {
+        self.axes.iter().all(|axis| {
+            let of_sides = axis.sides.iter().flat_map(|side| [&side.sign, &side.peak]);
+            let jumps = axis.sides.iter().flat_map(|side| &side.jumps);
+            are_numbers(of_sides.chain(jumps).chain(&axis.last).chain(&axis.quantum))
+        })
     }
 
     /// Axes that were clipped at any level, of a sensor whose unit is nobody's matter.
@@ -121,7 +150,7 @@ impl Axis {
         if let Some(last) = self.last {
             let change = (rate - last).abs();
             if change > 0.0 {
-                self.quantum = self.quantum.min(change);
+                self.quantum = Some(self.quantum.map_or(change, |least| least.min(change)));
             }
         }
         for side in &mut self.sides {
@@ -131,12 +160,8 @@ impl Axis {
     }
 
     fn clipped(&self, rad: f64) -> Option<Clipped> {
-        let is_clipped = |side: &&Side| {
-            side.longest >= RUN
-                && side.peak > FLOOR * rad
-                && side.median_jump() > STEPS * self.quantum
-        };
-        let side = self.sides.iter().find(is_clipped)?;
+        let mut sides = self.sides.iter();
+        let side = sides.find(|side| side.is_clipped(self.quantum, rad))?;
         Some(Clipped {
             level: side.peak * side.sign,
             samples: side.samples,
@@ -145,6 +170,13 @@ impl Axis {
 }
 
 impl Side {
+    /// Whether the peak is an end of the range, where the least change of the axis is `quantum`.
+    fn is_clipped(&self, quantum: Option<f64>, rad: f64) -> bool {
+        self.longest >= RUN
+            && self.peak > FLOOR * rad
+            && quantum.is_some_and(|quantum| self.median_jump() > STEPS * quantum)
+    }
+
     fn push(&mut self, rate: f64, last: Option<f64>, other_changed: bool) {
         let reading = rate * self.sign;
         let last = last.map(|last| last * self.sign);
@@ -195,6 +227,28 @@ impl Side {
             }
             _ => upper,
         }
+    }
+}
+
+/// Jumps in a state file: those there are.
+#[cfg(feature = "serde")]
+mod jumps {
+    use super::KEPT;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(jumps: &[f64; KEPT], to: S) -> Result<S::Ok, S::Error> {
+        let count = jumps.iter().rposition(|jump| *jump != 0.0);
+        let there = jumps.get(..count.map_or(0, |last| last + 1));
+        there.unwrap_or_default().serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; KEPT], D::Error> {
+        let there = Vec::<f64>::deserialize(from)?;
+        let mut jumps = [0.0; KEPT];
+        let room = jumps.get_mut(..there.len());
+        room.ok_or_else(|| D::Error::custom("more jumps than are kept"))?
+            .copy_from_slice(&there);
+        Ok(jumps)
     }
 }
 

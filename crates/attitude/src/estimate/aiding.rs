@@ -247,7 +247,6 @@ impl Aiding {
 
     fn with_scale((plan, resolved): (&EstimationSettings, &Meaning), force_scale: f64) -> Aiding {
         let mut settings = Settings {
-            gyro_range: plan.gyro_range.unwrap_or(0.0),
             has_field: plan.aid == Aid::GravityAndField,
             hard_iron: plan.mag_hard_iron,
             ..Settings::default()

@@ -206,7 +206,6 @@ impl Estimator {
                             is_class_found: plan.noise.is_by_data()
                                 && prepared.noise != plan.noise.taken(),
                             bias_sigma: prepared.noise.bias_of_class(),
-                            gyro_range: aiding.settings.gyro_range,
                             known: PriorSigmas {
                                 gyro_bias: aiding.stated_bias(prepared.bias_left.is_some()),
                                 ..resolved.beforehand()

@@ -34,8 +34,6 @@ use crate::setting::{AID, BIAS, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT};
 use crate::worlds::{self, Convention, World};
 use nalgebra::Vector3;
 
-/// Share of the level at which samples were clipped that counts as the range.
-const AT_RANGE: f64 = 0.999;
 /// Seconds of data in which rest is sought when the log cannot be read twice.
 const REST_SECS: f64 = 60.0;
 
@@ -143,6 +141,7 @@ impl Preparation {
             .then(Vec::new),
             rails: (plan.gyro_range.is_none()
                 && patience == Patience::WholeLog
+                && !is_causal(plan)
                 && matches!(resolved.kind, SampleKind::Rate | SampleKind::Average))
             .then(Rails::new),
             beside: Vec::new(),

@@ -44,8 +44,6 @@ pub(super) struct SmoothingInputs {
     pub(super) is_class_found: bool,
     /// Standard deviation of the gyro's bias in its class, rad/s.
     pub(super) bias_sigma: f64,
-    /// Range of the gyro, rad/s; 0: not known.
-    pub(super) gyro_range: f64,
     /// Prior knowledge of this sensor.
     pub(super) known: PriorSigmas,
 }
@@ -172,6 +170,7 @@ impl Samples for Reading<'_> {
                     rate: turning,
                     force,
                     field: fields.at(rate.stamp, &turning.0).map(In::assume),
+                    is_saturated: rate.status.has(Status::SATURATED),
                 });
                 if let Some(waiting) = self.waiting {
                     let rate = RateSample {
@@ -340,7 +339,6 @@ impl Smoothing {
             sample_model,
             field_unit: FieldUnit::Unknown,
             bias_sigma: self.told.bias_sigma,
-            gyro_range: self.told.gyro_range,
             looseness: self.told.looseness,
             other: self.told.other.map(|looseness| OtherClass {
                 looseness,
@@ -559,7 +557,6 @@ mod tests {
                 kind: SampleKind::Rate,
                 heading: None,
                 bias_sigma: BIAS_SIGMA,
-                gyro_range: 0.0,
                 looseness: PriorScale::default(),
                 other: None,
                 is_class_found: false,

@@ -194,6 +194,7 @@ impl Catmull {
                 point.field = Vector3::repeat(f64::NAN);
                 point.is_input = false;
                 point.doubt = [0.0; 2];
+                point.clipped = Vector3::zeros();
                 point.is_bridged = false;
             }
             self.rate = rate;

@@ -170,8 +170,8 @@ pub(super) fn inertial<const W: usize>(
     let by_way = by_turn(&(position + up * (0.5 * secs * secs)));
     let force = FORCE_NOISE * FORCE_NOISE;
     let known = if segment.is_break { 0.0 } else { 1.0 };
+    let turned = TURN_NOISE * TURN_NOISE * secs + segment.doubt[0];
     let weights = [
-        known / (TURN_NOISE * TURN_NOISE * secs + segment.doubt[0]),
         known / (force * secs + segment.doubt[1]),
         known / (force * secs.powi(3) / 3.0 + segment.doubt[1] * secs * secs),
         1.0 / (BIAS_NOISE * BIAS_NOISE * secs),
@@ -179,7 +179,11 @@ pub(super) fn inertial<const W: usize>(
     std::array::from_fn(|i| {
         let (kind, r) = (i / 3, i % 3);
         let residual = [turn[r], speed[r], way[r], walk[r]][kind];
-        let mut row = Row::new(residual, weights[kind], Some(i));
+        let weight = match kind {
+            0 => known / (turned + swept.clipped[r]),
+            kind => weights[kind - 1],
+        };
+        let mut row = Row::new(residual, weight, Some(i));
         row.own[i] = -1.0;
         match kind {
             0 => {

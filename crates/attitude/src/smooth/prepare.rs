@@ -9,12 +9,11 @@ use super::prepared::{BESIDE, Prepared};
 use super::sample::{Numbers, Sample};
 use super::settings::{SampleModel, Settings};
 use super::survey::{LONGEST, Survey};
+use crate::clipped_run::ClippedRun;
 use nalgebra::Vector3;
 
 /// Longer steps, in ordinary ones, are gaps.
 const GAP: f64 = 1.6;
-/// A rate of at least this share of the gyro's range is at it: a bias may have been taken out.
-pub(super) const NEAR_RANGE: f64 = 0.99;
 /// Instantaneous samples farther apart get others between them, s.
 const LONGEST_STEP: f64 = 0.005;
 /// Samples that gaps may be filled with beyond [`FILLED`] for each that was measured: where stamps come in bursts the
@@ -26,8 +25,8 @@ const FILLED: usize = 20;
 pub(super) struct Preparer<'a> {
     survey: &'a Survey,
     has_unresolved: bool,
-    /// Rates from here on may be any beyond, rad/s.
-    range: f64,
+    /// Samples at the end of the gyro's range, up to now.
+    clipped: ClippedRun,
     gate: Gate,
     /// Accepted, a few of them given on already.
     window: Vec<(Numbers, u64)>,
@@ -46,10 +45,7 @@ impl<'a> Preparer<'a> {
         Preparer {
             survey,
             has_unresolved: settings.has_unresolved,
-            range: match settings.gyro_range {
-                0.0 => f64::INFINITY,
-                range => range * NEAR_RANGE,
-            },
+            clipped: ClippedRun::default(),
             gate: Gate::default(),
             window: Vec::new(),
             next: 0,
@@ -105,13 +101,17 @@ impl<'a> Preparer<'a> {
                 is_input: true,
                 is_after_break: false,
                 is_bridged: false,
+                is_saturated: sample.is_saturated,
+                clipped: Vector3::zeros(),
                 doubt: [0.0; 2],
             };
             if self.has_unresolved && !is_gap {
                 prepared.doubt = bridge::unresolved(&self.window, i, secs);
             }
-            let clipped = sample.rate.iter().filter(|rate| rate.abs() >= self.range);
-            let unknown: f64 = clipped.map(|rate| (0.5 * rate * secs).powi(2)).sum();
+            let change = before.map_or(0.0, |before| (sample.rate - before.rate).norm_squared());
+            prepared.clipped = self
+                .clipped
+                .add(sample.is_saturated, &sample.rate, change, secs);
             if let Some(before) = &before
                 && is_gap
             {
@@ -135,6 +135,7 @@ impl<'a> Preparer<'a> {
                             field: Vector3::repeat(f64::NAN),
                             is_input: false,
                             is_bridged: false,
+                            clipped: Vector3::zeros(),
                             doubt: [0.0; 2],
                             ..prepared
                         };
@@ -143,7 +144,6 @@ impl<'a> Preparer<'a> {
                     prepared.secs = secs / parts;
                 }
             }
-            prepared.doubt[0] += unknown;
             self.give(prepared, out);
         }
     }

@@ -22,6 +22,10 @@ pub(super) struct Prepared {
     pub is_after_break: bool,
     /// A gap before it was bridged.
     pub is_bridged: bool,
+    /// Whether the rate is that of the end of the gyro's range.
+    pub is_saturated: bool,
+    /// Variance of the rotation that this leaves about each axis of the body, rad^2.
+    pub clipped: Vector3<f64>,
     /// Variance that a gap before it, and motion faster than the samples, leave of attitude and velocity: rad^2,
     /// (m/s)^2.
     pub doubt: [f64; 2],

@@ -4,7 +4,6 @@
 //! what the result falls back to.
 
 use super::pass::by_segment;
-use super::prepare::NEAR_RANGE;
 use super::sample::Samples;
 use super::segments::{Segment, median_of};
 use super::settings::{BIAS_SIGMA, Settings};
@@ -44,7 +43,6 @@ pub(super) fn run<S: Samples>(
         bias_prior: class,
         bias_class: class,
         rest_by_direction: true,
-        gyro_range: with.1.gyro_range * NEAR_RANGE,
         ..usual
     };
     if with.1.known.gyro_bias.iter().any(Option::is_some) {
@@ -119,7 +117,10 @@ fn pass<S: Samples>(
                 gyro: Measured::Increment(BodyRate(sample.rate - known).held_for(secs)),
                 accel: Some(In::assume(sample.force)),
                 join,
-                status: Status::OK,
+                status: match sample.is_saturated {
+                    true => Status::SATURATED,
+                    false => Status::OK,
+                },
                 log: stamp,
             };
             aided.push(&[rate], &mut out);

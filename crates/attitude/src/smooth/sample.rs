@@ -22,6 +22,8 @@ pub struct Sample {
     pub force: Option<In<Body>>,
     /// Magnetic field, uT. One that was measured only once comes once.
     pub field: Option<In<Body>>,
+    /// Whether the rate is that of the end of the gyro's range, and the true one beyond.
+    pub is_saturated: bool,
 }
 
 /// The numbers of a [`Sample`], for the smoother's own arithmetic, which knows no other axes.
@@ -31,6 +33,7 @@ pub(super) struct Numbers {
     pub(super) rate: Vector3<f64>,
     pub(super) force: Option<Vector3<f64>>,
     pub(super) field: Option<Vector3<f64>>,
+    pub(super) is_saturated: bool,
 }
 
 impl From<&Sample> for Numbers {
@@ -41,6 +44,7 @@ impl From<&Sample> for Numbers {
             rate: sample.rate.0,
             force: sample.force.map(numbers),
             field: sample.field.map(numbers),
+            is_saturated: sample.is_saturated,
         }
     }
 }

@@ -135,8 +135,6 @@ pub struct Settings {
     pub node_spacing: Option<f64>,
     /// Standard deviation of the gyro's bias in the sensor's class, rad/s.
     pub bias_sigma: f64,
-    /// Range of the gyro, rad/s: a rate at it may be any beyond. 0: not known.
-    pub gyro_range: f64,
     /// Ratio of the sigmas of calibration constants to those after a calibration in the factory.
     pub looseness: PriorScale,
     /// Class that the sensor may be of instead.
@@ -170,7 +168,6 @@ impl Default for Settings {
         Settings {
             node_spacing: None,
             bias_sigma: BIAS_SIGMA,
-            gyro_range: 0.0,
             looseness: PriorScale::default(),
             other: None,
             known: PriorSigmas::default(),
@@ -210,9 +207,6 @@ impl Settings {
         }
         if !in_range(self.bias_sigma, 1e-9, 1.0) {
             return Some(("bias_sigma", self.bias_sigma));
-        }
-        if !in_range(self.gyro_range, 0.0, f64::MAX) {
-            return Some(("gyro_range", self.gyro_range));
         }
         if !in_range(self.sensor_delay, -1.0, 1.0) {
             return Some(("sensor_delay", self.sensor_delay));

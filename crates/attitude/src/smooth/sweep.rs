@@ -75,6 +75,8 @@ pub(super) struct Swept {
     pub velocity: [f64; 3],
     pub position: [f64; 3],
     pub secs: f64,
+    /// Variance that samples at the end of the gyro's range leave of the rotation about each axis of the earth, rad^2.
+    pub clipped: [f64; 3],
     /// Derivative by bias (3), the gyro's matrix (9) and its sensitivity (9).
     pub by_turn: [[f64; TURN]; 3],
     /// The same, then by the accelerometer's bias (3), matrix (9), time offset.
@@ -158,6 +160,7 @@ pub(super) fn sweep<const FIELD: bool>(
     let (mut own_v, mut own_p) = ([[0.0; OWN]; 3], [[0.0; OWN]; 3]);
     let (mut v, mut p) = ([0.0; 3], [0.0; 3]);
     let mut secs = 0.0;
+    let mut clipped = [0.0; 3];
     let mut field = FieldMeans::none();
     for sample in samples {
         let dt = sample.secs;
@@ -201,6 +204,12 @@ pub(super) fn sweep<const FIELD: bool>(
                 own_v[i][j] += y[j] * dt;
             }
         }
+        if sample.is_saturated {
+            for (sum, row) in clipped.iter_mut().zip(&r) {
+                let about = row.iter().zip(&sample.clipped);
+                *sum += about.map(|(r, variance)| r * r * variance).sum::<f64>();
+            }
+        }
         if !sample.field.x.is_nan() {
             add_field::<FIELD>(&sample.field, &w, &r, &d, sensor, &mut field);
         }
@@ -217,6 +226,7 @@ pub(super) fn sweep<const FIELD: bool>(
         velocity: v,
         position: p,
         secs,
+        clipped,
         by_turn: by_bias(d, &sensor.gyro),
         by_velocity: joined(by_bias(dv, &sensor.gyro), &own_v, &sensor.force),
         by_position: joined(by_bias(dp, &sensor.gyro), &own_p, &sensor.force),

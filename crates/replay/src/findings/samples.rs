@@ -187,17 +187,19 @@ fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     for (axis, stats) in moving {
         let name = axis_name(axis);
         if let Some(Clipped { level: at, samples }) = clipped.get(axis).copied().flatten() {
+            let level = significant(at, 5);
+            let unit = if is_in_degrees { "deg/s" } else { "rad/s" };
             out.push(
                 Finding::new(
                     Severity::Error,
                     "saturated",
-                    format!("gyro {name} reads exactly {at} in {samples} samples: looks saturated"),
+                    format!("gyro {name} reads exactly {level} {unit} in {samples} samples: looks saturated"),
                 )
                 .with("axis", name)
                 .with("reading", at)
                 .with("samples", samples)
                 .advise(
-                    "the true rate was higher: the attitude is wrong after it; have them flagged",
+                    "the true rate was higher: sigma grows by the rotation that is lost; a wider range in the sensor keeps it. To state the range",
                 )
                 .help([GYRO_RANGE.to(format!("{:.4}", at.abs()))]),
             );

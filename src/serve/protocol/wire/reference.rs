@@ -16,7 +16,7 @@ const EXPECTED: &str = "{\"class\":\"ATT\",\"id\":\"truth\",\"stamp\":{\"sec\":1
 /// One attitude, and what it is of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
-    /// Its `id`: `truth`, or that of a sensor and `truth` behind it.
+    /// Id: `truth`, or that of a sensor and `truth` behind it.
     pub id: String,
     /// World from whose axes it comes.
     pub world: World,

@@ -115,6 +115,7 @@ impl Run {
                 rate,
                 force,
                 field,
+                is_saturated: false,
             };
             self.filter.begin(&measured, &self.propagated);
             return;
@@ -141,6 +142,7 @@ impl Run {
             rate,
             force,
             field,
+            is_saturated: false,
         };
         let (_, r) = self.filter.corrected(&self.propagated);
         let _ = self.filter.take(&measured, &known, &r);

@@ -2,8 +2,7 @@
 //!
 //! Apart from the rest of the preparation because both are told by the readings alone, whatever they mean.
 
-use super::AT_RANGE;
-use crate::condition::rails::{Clipped, Rails};
+use crate::condition::rails::{AT_RANGE, Clipped, Rails};
 use crate::condition::truncation::Grid;
 use crate::diagnostic::Diagnostic;
 use crate::estimate::plan::{Aid, EstimationSettings, Truncation};
@@ -17,7 +16,6 @@ pub(super) fn clipped_at(rails: Option<Rails>, warnings: &mut Vec<Diagnostic>) -
     warnings.push(format!(
         "gyro {name} stays at exactly {level:.4} rad/s, {samples} samples in all: that is taken for the end of its range, beyond which the rate is unknown; {GYRO_RANGE} RAD_S states another"
     ).into());
-    // What a bias leaves of it is at the range, too.
     Some(level.abs() * AT_RANGE)
 }
 

@@ -458,8 +458,8 @@ pub static ROWS: [Row; 38] = [
     Row {
         setting: GYRO_RANGE,
         meaning: "Full scale of the gyro in rad/s: samples at or beyond it are marked saturated",
-        effect: "Rotation that the gyro clips is lost: saturated samples are counted and shown.",
-        default: Default::Unset("unknown"),
+        effect: "Rotation that the gyro clips is lost: saturated samples are counted and shown, and sigma grows about the axis that was clipped.",
+        default: Default::Unset("the level at which an axis is seen to be clipped"),
         placeholder: "RAD_S",
         takes: number("rad/s", 0.0, f64::INFINITY, |p, range| p.gyro_range = Some(range)),
         ..ROW

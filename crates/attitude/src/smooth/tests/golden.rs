@@ -276,6 +276,7 @@ fn gridded(on_grid: fn(f64) -> f64) -> (Vec<Sample>, Vec<Vector3<f64>>) {
         rate: BodyRate(rate.map(|w| on_grid(w / step) * step)),
         force: Some(In::assume(Vector3::z() * 9.81)),
         field: None,
+        is_saturated: false,
     };
     ((0..).zip(&rates).map(sample).collect(), rates)
 }
@@ -317,6 +318,7 @@ fn a_hole_is_filled_by_a_cubic() {
                 rate: BodyRate(Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), t * t)),
                 force: Some(In::assume(Vector3::z() * 9.81)),
                 field: None,
+                is_saturated: false,
             }
         })
         .collect();

@@ -13,6 +13,7 @@ fn sample(i: i64) -> Sample {
         rate: BodyRate::ZERO,
         force: Some(In::assume(Vector3::z() * 9.81)),
         field: None,
+        is_saturated: false,
     }
 }
 

@@ -110,6 +110,7 @@ pub(super) fn log(motion: Motion) -> Log {
             field: Some(In::assume(
                 to_body * Vector3::from(FIELD) + Vector3::from(IRON),
             )),
+            is_saturated: false,
         });
         truth.push(q);
     }

@@ -99,6 +99,7 @@ impl Body {
                 rate: BodyRate(rate),
                 force: Some(In::assume(force)),
                 field: None,
+                is_saturated: false,
             });
             truth.push(q);
         }
@@ -140,7 +141,7 @@ struct Seen {
     smoothed: Smoothed,
 }
 
-fn inside(estimates: &[Estimate], truth: &[[f64; 4]]) -> f64 {
+pub(super) fn inside(estimates: &[Estimate], truth: &[[f64; 4]]) -> f64 {
     let heading = |i: usize| {
         let [w, _, _, z] = product(&estimates[i].q_nb.wxyz(), &conjugate(&truth[i]));
         2.0 * z.atan2(w)

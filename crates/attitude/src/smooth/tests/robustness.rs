@@ -1,6 +1,7 @@
 //! Threads, chunks, breaks, no standstill, large biases: what the result must not depend on or break at.
 
 use super::logs::{Log, Motion, conjugate, errors, log, product};
+use super::planar::inside;
 use crate::frames::In;
 use crate::smooth::{Estimate, Outcome, Sample, SampleModel, Samples, Settings, Smoothed, smooth};
 use nalgebra::Vector3;
@@ -272,5 +273,33 @@ fn taps_are_taken_for_what_they_are() {
     assert!(
         tilt < 0.5 * without && inside > 0.98,
         "{tilt} {inside} {without}"
+    );
+}
+
+#[test]
+fn a_clipped_gyro_is_doubted_about_its_own_axis() {
+    let mut hand = log(Motion::Hand).plain();
+    let rates = || hand.samples.iter().map(|sample| sample.rate.0.z.abs());
+    let range = 0.6 * rates().fold(0.0, f64::max);
+    let mut clipped = 0;
+    for sample in &mut hand.samples {
+        sample.is_saturated = sample.rate.0.z.abs() >= range;
+        clipped += usize::from(sample.is_saturated);
+        sample.rate.0.z = sample.rate.0.z.clamp(-range, range);
+    }
+    assert!(clipped > 100, "{clipped}");
+    let (_, flagged) = hand.smoothed(&Settings::default());
+    let of_flagged = errors(&flagged, &hand.truth, true);
+    let within = inside(&flagged, &hand.truth);
+    for sample in &mut hand.samples {
+        sample.is_saturated = false;
+    }
+    let (_, quiet) = hand.smoothed(&Settings::default());
+    let of_quiet = errors(&quiet, &hand.truth, true);
+    assert!(within > 0.97, "{within}");
+    assert!(inside(&quiet, &hand.truth) < 0.7, "{of_quiet:?}");
+    assert!(
+        of_flagged[0] < 0.5 * of_quiet[0],
+        "{of_flagged:?} {of_quiet:?}"
     );
 }
