@@ -317,7 +317,8 @@ fn the_table_holds_levelled_sensors_against_their_truth() {
         "{rows}.map((e) => e.dataset.sensor).sort().join()"
     ));
     assert_eq!(shown, "foot,hip,knee");
-    assert!(browser.text("fleet").starts_with("3 sensors"));
+    let title = browser.eval("document.getElementById('fleet-title').textContent");
+    assert_eq!(title, "3 sensors");
     for simulation in simulations {
         let ran = simulation.wait_with_output().unwrap();
         assert!(ran.status.success());
