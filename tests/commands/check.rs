@@ -1,6 +1,7 @@
 //! Promise: `strapd check` finds what is wrong with a log, invents nothing, and its advice helps.
 
 mod advice;
+mod counts;
 mod faults;
 mod forces_elsewhere;
 mod judged;

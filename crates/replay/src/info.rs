@@ -8,9 +8,7 @@ use crate::shell::{flag, quoted_file};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
-use strapd_attitude::setting::{
-    AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, GYRO_UNIT, INIT, JOIN, TOPIC,
-};
+use strapd_attitude::setting::{AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, INIT, JOIN, TOPIC};
 use strapd_recording::mcap::Survey;
 use strapd_recording::recording::beside::TopicOfVectors;
 use strapd_recording::recording::log_channel::LogChannel;
@@ -25,6 +23,8 @@ const FIELD_UNITS: [(&str, f64); 5] = [
     ("nT", 1e-9),
 ];
 const EARTHS_FIELD: std::ops::Range<f64> = 1.5e-5..1e-4;
+/// Codes of findings that may know the unit of the rates.
+const UNITS: [&str; 2] = ["unit-degrees", "unit-against-gravity"];
 /// Rests that are listed.
 const RESTS: usize = 100;
 
@@ -94,9 +94,11 @@ impl Overview<'_> {
             }
         };
         let mut help: Vec<Choice> = Vec::new();
-        if of_samples(best).iter().any(|f| f.code == "unit-degrees") {
-            help.push(GYRO_UNIT.to("deg"));
-        }
+        let units = of_samples(best)
+            .into_iter()
+            .filter(|f| UNITS.contains(&f.code));
+        let one = |f: Finding| <[_; 1]>::try_from(f.help).ok();
+        help.extend(units.filter_map(one).flatten().flatten().next());
         if best.bias.is_some() {
             help.push(BIAS.to("auto"));
             let start = best.rests.kept.first().zip(best.rests.first);

@@ -23,6 +23,8 @@ const LARGEST_FIELD: f64 = 1e6;
 const FORCE_SECS: f64 = 0.5;
 /// One sigma of the scale, and of the angles between the axes (rad), of a gyro that is none of its class.
 pub(super) const WIDE: f64 = 0.01;
+/// Sigma of tilt, rad, from which one that was clipped is levelled: what a correction does not know of the heading is lost.
+const CLIPPED_LEVEL: f64 = 1.0;
 /// Number of gaps in a row after which the sensor has become slower.
 const GAPS_IN_A_ROW: u32 = 20;
 
@@ -506,6 +508,8 @@ impl Filter {
         for (axis, variance) in unknown.iter().enumerate().filter(|(_, v)| **v > 0.0) {
             let axis = r.column(axis).into_owned();
             self.state.covariance.add_about(&axis, *variance);
+            self.state.interval.is_clipped = true;
+            self.want_level(CLIPPED_LEVEL);
         }
     }
 
@@ -515,11 +519,16 @@ impl Filter {
         let squared: f64 = (0..3).map(fastest).sum();
         let unknown = ((squared / 3.0 + 0.01) * secs * secs).min(3.0);
         self.state.covariance.add_to_attitude(unknown);
-        self.state.wants_level |=
-            self.state.covariance.variance(TILT) > self.settings.level_sigma.powi(2);
+        self.want_level(self.settings.level_sigma);
         self.restart_reference(1.0, 1.0);
         self.state.rest.interrupt();
         self.state.vertical = Vertical::default();
+    }
+
+    /// Asks for levelling where the tilt is known to no more than `sigma`, rad: a correction is linear.
+    fn want_level(&mut self, sigma: f64) {
+        let tilts = [TILT, TILT + 1].map(|axis| self.state.covariance.variance(axis));
+        self.state.wants_level |= tilts[0].max(tilts[1]) > sigma * sigma;
     }
 
     pub(super) fn is_force(&self, force: &Vector3<f64>) -> bool {

@@ -38,7 +38,8 @@ impl Filter {
             (force.acceleration - self.state.mean_acceleration) * (secs / (MEAN_SECS + secs));
         let gravity = Vector3::z() * self.settings.gravity;
         self.watch_length((self.state.mean_acceleration + gravity).norm(), secs);
-        if self.state.wants_level && self.level(force.acceleration + gravity) {
+        let is_known = !self.state.interval.is_clipped;
+        if self.state.wants_level && is_known && self.level(force.acceleration + gravity) {
             self.state.wants_level = false;
             return true;
         }

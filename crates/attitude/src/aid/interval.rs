@@ -40,6 +40,9 @@ pub(super) struct Interval {
     /// the variance, 1/rad^2.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub(super) outside: [f64; 2],
+    /// Whether a sample was at the end of the gyro's range.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) is_clipped: bool,
 }
 
 /// Whether nothing came of it.

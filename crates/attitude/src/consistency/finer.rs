@@ -184,7 +184,13 @@ fn units_with_axes(segments: &[&Segment], recorded: f64) -> Option<Finer> {
     let factor = found.map.norm() / axes.norm();
     let sigma = found.sigma[3] * unit / factor;
     let is_sound = sigma.is_finite() && found.left < LARGEST_FOUND.max(verdict.found);
-    is_sound.then_some(Finer {
+    // Swings as long as a segment come back whatever their size, and leave little of gravity.
+    let has_gravity = gravity(segments, &found.map) >= LEAST_GRAVITY;
+    let is_unit = units().any(|unit| {
+        let alone = scatters(last, &Matrix3::from_diagonal_element(unit));
+        alone.is_some_and(|alone| wanders(&alone) <= verdict.found)
+    });
+    (is_sound && has_gravity && !is_unit).then_some(Finer {
         kind: Kind::UnitAndAxes {
             axes: AxisMap::from_matrix(&axes)?,
             decided,
@@ -339,6 +345,14 @@ fn scatters(segments: &[&Segment], map: &Matrix3<f64>) -> Option<Vec<f64>> {
         found.s.max(0.0) + missing * missing
     });
     Some(of.collect())
+}
+
+/// Median mean force under a map, g.
+fn gravity(segments: &[&Segment], map: &Matrix3<f64>) -> f64 {
+    let bias = refine::<3>(segments.iter().copied(), map, &[]).map(|found| found.bias);
+    let bias = bias.unwrap_or_default();
+    let of = |segment: &&Segment| segment.scatter::<3>(map, &[], &bias).gravity;
+    median(&mut segments.iter().map(of).collect::<Vec<f64>>())
 }
 
 fn rotation(by: &Vector3<f64>) -> Matrix3<f64> {

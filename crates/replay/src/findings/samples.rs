@@ -8,6 +8,7 @@ mod stamps;
 #[cfg(test)]
 mod tests;
 
+pub(super) use self::gravity::COUNTS;
 pub(super) use self::stamps::missing_samples;
 use super::{Finding, Severity, verdicts};
 use crate::inspection::Inspection;
@@ -140,7 +141,7 @@ fn degrees(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let peak = axes
         .map(|a| a.max.abs().max(a.min.abs()))
         .fold(0.0, f64::max);
-    if is_fast(seen.looked) {
+    if is_fast(seen.looked) && !gravity::shows_counts(seen.looked) {
         out.push(rates_of_another_unit(peak));
     }
 }

@@ -3,6 +3,7 @@
 //! Apart from the rules about samples because it needs the samples integrated; what is measured is in
 //! `strapd_attitude::consistency`. A cure is advised where the recording, integrated with it, agrees.
 
+use super::samples::COUNTS;
 use super::{Finding, Severity};
 use crate::summary::significant;
 use nalgebra::Matrix3;
@@ -342,6 +343,10 @@ pub(super) fn is_guess(code: &str) -> bool {
 /// Leaves of several findings about one cause the one that knows it best.
 pub(super) fn settle(found: &mut Vec<Finding>) {
     let Some(cause) = found.iter().find(|f| [AXES, SCALE].contains(&f.code)) else {
+        if found.iter().any(|f| f.evidence.contains_key(COUNTS)) {
+            let others = ["unit-unknown", "gyro-against-gravity"];
+            found.retain(|f| !others.contains(&f.code) && !BY_UNIT.contains(&f.code));
+        }
         return;
     };
     let (is_scale, cures) = (cause.code == SCALE, cause.help.clone());

@@ -96,3 +96,58 @@ fn a_swing_within_the_range_is_as_sure_as_before() {
     assert!(flagged == plain);
     assert!(seen(&plain).1 < 2.0);
 }
+
+#[test]
+fn a_flip_far_beyond_the_range_is_levelled_as_soon_as_it_is_over() {
+    // 600 degrees about x in 0.2 s, by a gyro of 2000 deg/s, and then a rest.
+    let (range, turn, secs) = (2000_f64.to_radians(), 600_f64.to_radians(), 0.2);
+    let angle = |t: f64| {
+        let part = ((t - 3.0) / secs).clamp(0.0, 1.0);
+        let whole = std::f64::consts::TAU;
+        turn * (part - (whole * part).sin() / whole)
+    };
+    let propagation = propagate::Settings {
+        kind: SampleKind::Average,
+        ..propagate::Settings::default()
+    };
+    let mut aided = AidedPropagator::new(propagation, Settings::default(), Start::Level).unwrap();
+    let mut out = Vec::new();
+    for k in 0..5000_i64 {
+        let t = k as f64 * 1e-3;
+        let rate = (angle(t) - angle(t - 1e-3)) * 1e3;
+        let stamp = Nanos(k * 1_000_000);
+        let sample = RateSample {
+            stamp,
+            start: Nanos(stamp.0 - 1_000_000),
+            gyro: Measured::Rate(BodyRate(Vector3::new(rate.min(range), 0.0, 0.0))),
+            accel: Some(In::assume(
+                Vector3::new(0.0, angle(t).sin(), angle(t).cos()) * 9.81,
+            )),
+            join: match k {
+                0 => Join::Start,
+                _ => Join::Continuous,
+            },
+            status: match rate >= range {
+                true => Status::SATURATED,
+                false => Status::OK,
+            },
+            log: stamp,
+        };
+        aided.push(&[sample], &mut out);
+    }
+    aided.finish(&mut out);
+    let (mut worst, mut after) = (0.0_f64, 0.0_f64);
+    for sample in &out {
+        let t = sample.stamp.secs_since(Nanos(0));
+        let tilt = sample.q_nb.yaw_pitch_roll().roll - angle(t);
+        let tilt = tilt.sin().atan2(tilt.cos()).abs();
+        let sigma = sample.covariance.in_navigation_axes(&sample.q_nb).trace();
+        assert!(tilt <= 3.0 * sigma.sqrt(), "{t} s: {tilt} rad, {sigma}");
+        worst = worst.max(tilt.to_degrees());
+        if t > 3.5 {
+            after = after.max(tilt.to_degrees());
+        }
+    }
+    assert!(worst > 150.0, "{worst} deg are lost");
+    assert!(after < 2.0, "{after} deg are left");
+}

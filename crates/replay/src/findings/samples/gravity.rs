@@ -1,12 +1,16 @@
 //! Gravity as the accelerometer shows it -> findings about units, axes and mounting. Pure.
 
-use super::{Finding, Seen, Severity};
+use super::{Finding, Seen, Severity, is_fast};
 use crate::inspection::Inspection;
+use crate::summary::significant;
 use nalgebra::{Vector3, Vector4};
 use serde_json::json;
 use strapd_attitude::condition::quality::GravityAxis;
+use strapd_attitude::consistency::CHIPS;
 use strapd_attitude::frames::BodyAxes;
-use strapd_attitude::setting::{ACCEL_SIGN, ACCEL_TOPIC, AID, BODY, COLUMNS, GYRO_UNIT, MOUNT};
+use strapd_attitude::setting::{
+    ACCEL_SIGN, ACCEL_TOPIC, AID, BODY, COLUMNS, GYRO_SCALE, GYRO_UNIT, MOUNT,
+};
 use strapd_recording::format::Format;
 use strapd_recording::recording::beside::forces_elsewhere;
 use strapd_recording::text::printable;
@@ -15,28 +19,64 @@ use strapd_recording::text::printable;
 const MIN_CORRELATION: f64 = 0.7;
 /// Factors within 2.5 of a unit's belong to it; accelerations make them vary.
 const UNIT_FACTOR: f64 = 2.5;
+/// Correlation from which the counts of a chip are told apart, and share by which a factor is off theirs.
+const COUNTS_CORRELATION: f64 = 0.9;
+const COUNTS_WITHIN: f64 = 0.06;
+/// Key of the counts for one deg/s, in the evidence.
+pub(in crate::findings) const COUNTS: &str = "counts_per_deg_s";
 /// Fewer accelerations tell nothing of their unit.
 const FEWEST: u64 = 20;
 
+/// Unit that the rates look like.
+#[derive(Clone, Copy, PartialEq)]
+enum Fitting {
+    /// By its name.
+    Unit(&'static str),
+    /// Counts of a chip: so many for one deg/s, and its range, deg/s.
+    Counts(f64, u32),
+}
+
 /// Whether gravity turns in the accelerometer by another factor than the gyro says; and the gyro's unit that fits, if
 /// one does.
-fn another_factor(looked: &Inspection) -> Option<Option<&'static str>> {
+fn another_factor(looked: &Inspection) -> Option<Option<Fitting>> {
     let found = looked.quality.gyro_against_gravity?;
     let is_near = |factor: f64| (1.0 / UNIT_FACTOR..=UNIT_FACTOR).contains(&factor);
     let is_seen = found.correlation.abs() > MIN_CORRELATION;
     if !is_seen || is_near(found.factor) {
         return None;
     }
-    let units = [("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3)];
-    let mut fitting = units
+    let degree = 1_f64.to_radians();
+    let off = |(counts, _): &(f64, u32)| (found.factor * counts / degree - 1.0).abs();
+    // 16.4 counts for one deg/s and mrad/s are 6 % apart.
+    let is_mrad = |chip: &_| (found.factor / 1e-3 - 1.0).abs() < off(chip);
+    let nearest = CHIPS
+        .into_iter()
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .filter(|chip| {
+            found.correlation >= COUNTS_CORRELATION && off(chip) <= COUNTS_WITHIN && !is_mrad(chip)
+        })
+        .map(|(counts, range)| Fitting::Counts(counts, range));
+    let units = [("deg", degree), ("mrad", 1e-3)];
+    let unit = units
         .iter()
-        .filter(|(_, unit)| is_near(found.factor / unit));
-    Some(fitting.next().map(|(name, _)| *name))
+        .find(|(_, unit)| is_near(found.factor / unit))
+        .map(|(name, _)| Fitting::Unit(name));
+    Some(
+        match is_fast(looked) && unit != Some(Fitting::Unit("deg")) {
+            true => nearest.or(unit),
+            false => unit,
+        },
+    )
+}
+
+/// Whether the rates are counts by what gravity does.
+pub(super) fn shows_counts(looked: &Inspection) -> bool {
+    matches!(another_factor(looked), Some(Some(Fitting::Counts(..))))
 }
 
 /// Whether the gyro is in deg/s by what gravity does.
 pub(super) fn shows_degrees(looked: &Inspection) -> bool {
-    another_factor(looked) == Some(Some("deg"))
+    another_factor(looked) == Some(Some(Fitting::Unit("deg")))
 }
 
 /// Rates that turn gravity by another factor than it turns.
@@ -46,25 +86,31 @@ pub(super) fn turns_otherwise(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     else {
         return;
     };
-    let share = match unit {
-        Some(_) => format!("{:.4}", found.factor),
-        None => format!("{:.2}", found.factor),
-    };
+    let share = significant(found.factor, 3);
     let turns = format!(
         "gravity turns by {share} of what the gyro says (correlation {:.2})",
         found.correlation
     );
     let what = match unit {
-        Some(unit) => format!("{turns}: the rates look like {unit}/s"),
+        Some(Fitting::Unit(unit)) => format!("{turns}: the rates look like {unit}/s"),
+        Some(Fitting::Counts(counts, range)) => {
+            format!(
+                "{turns}: the rates look like counts of a range of {range} deg/s, {counts:.1} for one deg/s"
+            )
+        }
         None => format!("{turns}: gyro and accelerometer disagree about axes, signs or unit"),
     };
     let finding = Finding::new(Severity::Error, "unit-against-gravity", what)
         .with("factor", found.factor)
         .with("correlation", found.correlation);
     out.push(match unit {
-        Some(unit) => finding
+        Some(Fitting::Unit(unit)) => finding
             .advise("the accelerometer shows the unit of the rates")
             .help([GYRO_UNIT.to(unit)]),
+        Some(Fitting::Counts(counts, _)) => finding
+            .with(COUNTS, counts)
+            .advise("the accelerometer shows the unit of the rates; the data sheet has the number to the last digit")
+            .help([GYRO_SCALE.to(significant(1_f64.to_radians() / counts, 4))]),
         None => finding
             .advise("give the gyro's axes or unit as they are")
             .help([BODY.to("MAP")])

@@ -273,4 +273,15 @@ fn gravity_tells_the_unit_of_the_rates_and_where_they_disagree() {
     assert_eq!(advice(1_f64.to_degrees()), Some("gyro_unit deg".to_owned()));
     assert_eq!(advice(1000.0), Some("gyro_unit mrad".to_owned()));
     assert_eq!(advice(-1.0), Some("body MAP, or gyro_unit deg".to_owned()));
+    // Counts of the common chips, some percent off; what lies between them is not named.
+    for (counts, factor) in [
+        (131.0, "0.0001332"),
+        (16.4, "0.001064"),
+        (65.5, "0.0002665"),
+    ] {
+        let read = 1.03 * counts * 1_f64.to_degrees();
+        assert_eq!(advice(read), Some(format!("gyro_scale {factor}")));
+    }
+    let between = advice(100.0 * 1_f64.to_degrees());
+    assert_eq!(between, Some("body MAP, or gyro_unit deg".to_owned()));
 }
