@@ -30,7 +30,7 @@ const FEWEST: u64 = 20;
 /// Unit that the rates look like.
 #[derive(Clone, Copy, PartialEq)]
 enum Fitting {
-    /// By its name.
+    /// Unit with a name.
     Unit(&'static str),
     /// Counts of a chip: so many for one deg/s, and its range, deg/s.
     Counts(f64, u32),
