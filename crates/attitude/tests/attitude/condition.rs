@@ -1,6 +1,7 @@
 //! Promises of conditioning, sample by sample and over whole streams.
 
 mod coarse;
+mod range;
 mod recordings;
 mod rest;
 mod rules;
