@@ -207,7 +207,7 @@ pub enum Command {
     Model(model::Model),
     /// Allan deviation of a recording at rest: noise terms, and the flags for them
     Allan(allan::Allan),
-    /// Salvage every intact message of a damaged MCAP
+    /// Salvage every intact message of a damaged recording, as an MCAP
     Recover(recover::Recover),
     /// Shell completions on stdout
     Completions(manual::Completions),

@@ -14,7 +14,7 @@ use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 use strapd_recording::text::printable;
 
-/// Salvage every intact message of a damaged MCAP.
+/// Salvage every intact message of a damaged recording, as an MCAP.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd recover crashed.mcap -o whole.mcap          a cut file, a crash while writing, flipped bits
@@ -27,7 +27,7 @@ kept, and counted as unverified.
 
 Exit codes: 0 nothing was damaged; 3 recovered, but something was damaged; 1 nothing was written.")]
 pub struct Recover {
-    /// The damaged MCAP file, or - for standard input
+    /// The damaged recording (MCAP, ROS bag, ULog, rosbag2), or - for standard input
     #[arg(value_name = "IN")]
     pub source: String,
     /// The MCAP file to write

@@ -90,3 +90,65 @@ fn a_simulated_sensor_has_the_id_it_is_given_and_its_truth_beside_it() {
         assert!(ran.code == Some(2) && ran.err.contains(says), "{ran:?}");
     }
 }
+
+/// A trajectory as evo and the TUM benchmark write it: numbers alone.
+#[test]
+fn a_trajectory_without_a_heading_is_read_by_its_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let recording = fixture("ximu3.mcap");
+    let recording = recording.display();
+    strapd(at, &format!("replay {recording} -o own.tum -q")).done();
+    let own = std::fs::read_to_string(at.join("own.tum")).unwrap();
+    let bare: String = own
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert!(bare.len() < own.len());
+    std::fs::write(at.join("evo.tum"), &bare).unwrap();
+    for [a, b] in [["evo.tum", "own.tum"], ["own.tum", "evo.tum"]] {
+        let ran = strapd(at, &format!("compare {a} {b} --max-angle 1e-9"));
+        assert!(ran.done().out.contains("matched  500 "), "{ran:?}");
+    }
+    // Another name says nothing of its columns.
+    std::fs::write(at.join("evo.dat"), &bare).unwrap();
+    let ran = strapd(at, "compare evo.dat own.tum");
+    ran.refused(1, &["evo.dat", "--columns"]);
+}
+
+#[test]
+fn a_wrong_letter_in_a_name_and_a_recording_in_place_of_an_attitude_are_helped() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let table = "time,gyro_x,gyro_y,gyro_z\n0.00,0.1,0,0\n0.01,0.1,0,0\n0.02,0.1,0,0\n";
+    std::fs::write(at.join("thigh.csv"), table.replace("\\\n", "\n")).unwrap();
+    for command in [
+        "replay thihg.csv -o x.mcap",
+        "info thig.csv",
+        "check Thigh.csv",
+    ] {
+        strapd(at, command).refused(1, &["cannot open", "there is thigh.csv"]);
+    }
+    let ran = strapd(at, "replay shank.csv -o x.mcap");
+    assert!(
+        ran.code == Some(1) && !ran.err.contains("there is"),
+        "{ran:?}"
+    );
+    std::fs::create_dir(at.join("logs")).unwrap();
+    std::fs::write(at.join("logs/shank_left.csv"), table).unwrap();
+    let ran = strapd(at, "info logs/shank_lefft.csv");
+    ran.refused(1, &["there is logs/shank_left.csv"]);
+    for command in [
+        "compare thigh.csv thigh.csv",
+        "relative thigh.csv thigh.csv -o x.csv",
+    ] {
+        let ran = strapd(at, command);
+        for says in [
+            "holds no attitude",
+            "strapd replay thigh.csv -o attitude.mcap",
+        ] {
+            assert!(ran.code == Some(1) && ran.err.contains(says), "{ran:?}");
+        }
+    }
+}

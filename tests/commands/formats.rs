@@ -324,8 +324,8 @@ fn what_is_no_recording_is_called_so_on_standard_input_too() {
     for command in ["info", "check", "allan", "cat", "report --json"] {
         let fed = |bytes: &[u8]| strapd_fed(at, &format!("{command} -"), bytes.to_vec());
         fed(b"").refused(1, &["standard input", "empty"]);
-        fed(b"hello\nworld\n").refused(1, &["standard input", "not an MCAP", "hello"]);
-        fed(&[0xff; 3000]).refused(1, &["standard input", "not an MCAP"]);
+        fed(b"hello\nworld\n").refused(1, &["standard input", "no format that is read", "hello"]);
+        fed(&[0xff; 3000]).refused(1, &["standard input", "no format that is read"]);
         fed(b"{\"class\":\"STATUS\"}\n").refused(1, &["standard input", "no line carries"]);
         fed(b"{]\n").refused(
             1,

@@ -62,6 +62,7 @@ use ros::fifo::Fifo;
 use schema::{Schema, ros_name};
 use select::names::{self, Px4};
 use select::{MatchQuality, Selection};
+use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind, TimeUnit};
 
@@ -106,6 +107,9 @@ impl Wanted {
     }
 }
 
+/// Columns of a trajectory of the TUM benchmark (Sturm et al., 2012): `timestamp tx ty tz qx qy qz qw`.
+const TUM: &str = "orientation=8:5:6:7,stamp=1:s";
+
 /// Options that the user may state about messages.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
@@ -136,6 +140,16 @@ impl Options {
     pub(crate) fn states_stamp_unit(&self) -> bool {
         let mut fields = self.fields.iter();
         self.columns.is_some() || fields.any(|f| f.role == FieldRole::Stamp && f.unit.is_some())
+    }
+
+    /// The same for a file of this name: a `.tum` has columns and no heading.
+    #[must_use]
+    pub(crate) fn for_file(mut self, name: &Path) -> Options {
+        let ending = name.extension().unwrap_or_default();
+        if self.columns.is_none() && ending.eq_ignore_ascii_case("tum") {
+            self.columns = TUM.parse().ok();
+        }
+        self
     }
 
     /// Whether the user says where the samples' own interval lies, and in which unit.

@@ -172,22 +172,24 @@ fn several_imu_topics(path: &Path, listed: &str) -> Diagnostic {
     ))
 }
 
+/// What an error of the system says, with the help that may be in it.
+fn why(source: &std::io::Error) -> Diagnostic {
+    let own = source.get_ref().and_then(|why| why.downcast_ref());
+    own.cloned()
+        .unwrap_or_else(|| Diagnostic::new(source.to_string()))
+}
+
 impl From<&Error> for Diagnostic {
     fn from(error: &Error) -> Diagnostic {
         match error {
             Error::Open { path, source } => {
-                Diagnostic::new(format!("{}: cannot open: {source}", path.display()))
+                why(source).at(format_args!("{}: cannot open", path.display()))
             }
             Error::Read {
                 path,
                 offset,
                 source,
-            } => {
-                let own = source.get_ref().and_then(|why| why.downcast_ref());
-                let why: Option<Diagnostic> = own.cloned();
-                why.unwrap_or_else(|| Diagnostic::new(source.to_string()))
-                    .at(format_args!("{}: reading at byte {offset}", path.display()))
-            }
+            } => why(source).at(format_args!("{}: reading at byte {offset}", path.display())),
             Error::IsDirectory { path } => {
                 Diagnostic::new(format!("{}: is a directory", path.display()))
                     .help("name the .mcap file inside it")
@@ -196,10 +198,10 @@ impl From<&Error> for Diagnostic {
                 Diagnostic::new(format!("{}: the file is empty (0 bytes)", path.display()))
             }
             Error::NotMcap { path, found } => Diagnostic::new(format!(
-                "{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n",
+                "{}: no format that is read: it begins with {found}",
                 path.display()
             ))
-            .help(format!("no other format that is read begins so, either; of a table the first line names the columns, or {COLUMNS} does")),
+            .help(format!("an MCAP file begins with \\x89MCAP0\\r\\n; of a table the first line names the columns, or {COLUMNS} does")),
             Error::NotTable { path, why } => why.clone().at(format_args!(
                 "{}: no table that can be read",
                 path.display()

@@ -3,6 +3,8 @@
 //! Apart from the readers because it comes before all of them: files are called whatever somebody called them, and a
 //! pipe has no name. What the bytes say wins over what the name says.
 
+pub(crate) mod neighbour;
+
 use crate::error::{Error, Result};
 use crate::records::MAGIC;
 pub use crate::records::transcript::HEAD;
@@ -192,7 +194,7 @@ const ROWS: &[Row] = &[
         name: "CSV",
         magic: &[],
         looks_like: is_rows,
-        endings: &["csv", "tsv", "gcsv"],
+        endings: &["csv", "tsv", "gcsv", "tum"],
         reading: Reading::Rows,
         ..LOG
     },
@@ -477,7 +479,7 @@ pub fn open(path: &Path) -> Result<File> {
         path: path.to_owned(),
         source,
     };
-    let file = File::open(path).map_err(fail)?;
+    let file = File::open(path).map_err(|source| fail(neighbour::named(path, source)))?;
     let metadata = file.metadata().map_err(fail)?;
     if metadata.is_dir() {
         return Err(Error::IsDirectory {

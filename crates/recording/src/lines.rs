@@ -82,7 +82,8 @@ impl<R: Read> Lines<R> {
         lines.keep_head()?;
         if format.is_table() {
             let stem = name.file_stem().unwrap_or_default().to_string_lossy();
-            let mut opening = Opening::new(options, &stem);
+            let options = options.clone().for_file(name);
+            let mut opening = Opening::new(&options, &stem);
             while lines.read()? && opening.take(&lines.line) {}
             let (table, rows) = opening.finish().map_err(|why| Error::NotTable {
                 path: name.to_owned(),

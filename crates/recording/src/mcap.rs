@@ -114,7 +114,8 @@ impl Reader {
             path: path.to_owned(),
             source,
         };
-        let file = File::open(path).map_err(open)?;
+        let file =
+            File::open(path).map_err(|source| open(format::neighbour::named(path, source)))?;
         let meta = file.metadata().map_err(open)?;
         if meta.is_dir() {
             return Err(Error::IsDirectory {

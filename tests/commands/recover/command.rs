@@ -106,7 +106,7 @@ fn an_existing_output_and_the_input_itself_are_not_overwritten() {
     refused("recover whole.mcap", 2, "--output");
     refused("recover absent.mcap -o x.mcap", 1, "absent.mcap");
     std::fs::write(at("no.mcap"), b"not an MCAP").unwrap();
-    refused("recover no.mcap -o x.mcap", 1, "not an MCAP file");
+    refused("recover no.mcap -o x.mcap", 1, "no format that is read");
     refused("recover whole.mcap -o absent/x.mcap", 1, "does not exist");
     assert!(!at("x.mcap").exists() && !at(".x.mcap.part").exists());
 

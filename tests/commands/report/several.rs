@@ -36,7 +36,7 @@ fn several_logs_stand_side_by_side_in_one_page() {
         assert!(html.contains(&format!("<article id=\"log-{n}\">\n<h1>{name}</h1>")));
     }
     assert!(
-        row("<td>c.mcap</td>").contains("not an MCAP file"),
+        row("<td>c.mcap</td>").contains("no format that is read"),
         "{}",
         row("<td>c.mcap</td>")
     );

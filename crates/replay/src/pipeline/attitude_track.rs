@@ -4,6 +4,7 @@
 
 use super::simulate::TRUTH_TOPIC;
 use crate::error::{Error, Result};
+use crate::shell::quoted_file;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use std::io::{BufRead, BufReader};
@@ -237,7 +238,13 @@ fn attitude_channel<'l>(
     match all.as_slice() {
         [] => {
             let holds = topics::listing(&log.candidates());
-            let what = format!("holds no attitude; it holds:{holds}");
+            let what = Diagnostic::new(format!("holds no attitude; it holds:{holds}"));
+            let has_rates = log.channels.iter().any(|known| known.role.has_rate);
+            let made = format!(
+                "strapd replay {} -o attitude.mcap makes one",
+                quoted_file(path)
+            );
+            let what = if has_rates { what.help(made) } else { what };
             Err(Error::unsupported(path, what))
         }
         [(best, known), rest @ ..] if rest.first().is_none_or(|(next, _)| next < best) => Ok(known),
