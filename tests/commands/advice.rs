@@ -91,7 +91,7 @@ fn a_simulated_sensor_has_the_id_it_is_given_and_its_truth_beside_it() {
     }
 }
 
-/// A trajectory as evo and the TUM benchmark write it: numbers alone.
+/// Trajectory as evo and the TUM benchmark write it: numbers alone.
 #[test]
 fn a_trajectory_without_a_heading_is_read_by_its_name() {
     let dir = tempfile::tempdir().unwrap();

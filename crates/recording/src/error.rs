@@ -172,7 +172,7 @@ fn several_imu_topics(path: &Path, listed: &str) -> Diagnostic {
     ))
 }
 
-/// What an error of the system says, with the help that may be in it.
+/// Message of an error of the system, with the help that may be in it.
 fn why(source: &std::io::Error) -> Diagnostic {
     let own = source.get_ref().and_then(|why| why.downcast_ref());
     own.cloned()

@@ -29,7 +29,7 @@ fn what_is_not_there_a_directory_empty_or_no_mcap_is_called_so_by_every_command(
             1,
             &["text.mcap", "is a table of text", "help: call it .csv"],
         );
-        on("short.mcap").refused(1, &["short.mcap", "not an MCAP"]);
+        on("short.mcap").refused(1, &["short.mcap", "no format that is read"]);
     }
     assert!(!at.join("out.csv").exists());
     strapd(at, "compare nowhere.mcap log.mcap").refused(1, &["nowhere.mcap", "cannot open"]);
