@@ -27,7 +27,7 @@ const ELSEWHERE: [(&str, &str); 3] = [
 ];
 
 /// Number of lines of a page that are not run here. A line more is to be looked at.
-const UNTESTED: [(&str, usize); 15] = [
+const UNTESTED: [(&str, usize); 17] = [
     ("README.md", 5),
     ("docs/connect.md", 9),
     ("docs/estimation.md", 1),
@@ -37,10 +37,12 @@ const UNTESTED: [(&str, usize); 15] = [
     ("docs/joint.md", 4),
     ("docs/operations.md", 4),
     ("docs/performance.md", 10),
+    ("docs/phone.md", 4),
     ("docs/protocol.md", 8),
     ("docs/python.md", 6),
     ("docs/ros.md", 3),
     ("docs/scale.md", 8),
+    ("docs/start.md", 1),
     ("docs/usage.md", 5),
     ("docs/versions.md", 4),
 ];
