@@ -10,6 +10,8 @@ const EXCESS: f64 = 0.5;
 /// One sigma of the angle, in those under the parabola that goes on as the rate came to the end of the range: those of one
 /// motion have one sign.
 const PARABOLAS: f64 = 3.0;
+/// Most that a stretch leaves unknown, rad: all of it.
+const MOST: f64 = std::f64::consts::TAU;
 /// Share of the largest component at which another is at the end of the range, too.
 const ALSO: f64 = 0.98;
 
@@ -57,7 +59,7 @@ impl ClippedRun {
                 0.0 => excess,
                 slope => (PARABOLAS / 6.0 * slope * secs).min(excess),
             };
-            let angle = |secs: f64| mean(secs) * secs;
+            let angle = |secs: f64| (mean(secs) * secs).min(MOST);
             angle(self.secs).powi(2) - angle(before).powi(2)
         })
     }
@@ -117,6 +119,10 @@ mod tests {
         let mut run = ClippedRun::default();
         let begun = run.add(true, &Vector3::new(0.0, 3.0, 0.0), 1e-9, 0.1).y;
         assert!((begun.sqrt() - 0.15).abs() < 1e-12, "{begun}");
+        // An hour at the end of the range is no more unknown than a full turn.
+        let mut run = ClippedRun::default();
+        let hour = run.add(true, &Vector3::new(0.0, 3.0, 0.0), 1.0, 3600.0).y;
+        assert!((hour.sqrt() - MOST).abs() < 1e-9, "{hour}");
         // A rate that is not finite, or no time, leaves no state that is none.
         let mut run = ClippedRun::default();
         let _ = run.add(true, &Vector3::zeros(), 1.0, 0.0);

@@ -128,14 +128,36 @@ pub(super) fn section(rows: &[FindingRow], out: &mut String) {
     out.push_str("</section>\n");
 }
 
+/// Endings of keys, and the units that they stand for.
+const UNITS: [(&str, &str); 5] = [
+    ("_deg_per_h", " deg/h"),
+    ("_deg", " deg"),
+    ("_hz", " Hz"),
+    ("_ms", " ms"),
+    ("_s", " s"),
+];
+
 /// The numbers behind it, in one line.
 fn evidence(finding: &Finding) -> String {
-    let parts: Vec<String> = finding
-        .evidence
-        .iter()
-        .map(|(name, value)| format!("{}: {}", name.replace('_', " "), short(value)))
-        .collect();
-    parts.join("; ")
+    let parts = finding.evidence.iter();
+    let parts = parts.filter_map(|(key, value)| named(key, ": ", value));
+    parts.collect::<Vec<String>>().join("; ")
+}
+
+/// A value with its name and unit; nothing of one that is not there.
+fn named(key: &str, between: &str, value: &Value) -> Option<String> {
+    if value.is_null() {
+        return None;
+    }
+    let unit =
+        |(end, unit): &(&str, &'static str)| Some((key.strip_suffix(end)?.to_owned(), *unit));
+    let found = UNITS.iter().find_map(unit).filter(|_| value.is_number());
+    let (name, unit) = found.unwrap_or_else(|| (key.to_owned(), ""));
+    Some(format!(
+        "{}{between}{}{unit}",
+        name.replace('_', " "),
+        short(value)
+    ))
 }
 
 fn short(value: &Value) -> String {
@@ -146,11 +168,13 @@ fn short(value: &Value) -> String {
         Value::String(text) => text.clone(),
         Value::Array(all) => all.iter().map(short).collect::<Vec<_>>().join(", "),
         Value::Object(all) => {
-            let parts: Vec<String> = all
-                .iter()
-                .map(|(k, v)| format!("{k} {}", short(v)))
-                .collect();
-            parts.join(", ")
+            // What is said in words, and whether it was: the sentence has it.
+            let parts = all.iter().filter(|(_, value)| !value.is_boolean());
+            let parts = parts.filter_map(|(key, value)| match value {
+                Value::Object(_) => Some(format!("{key} ({})", short(value))),
+                _ => named(key, " ", value),
+            });
+            parts.collect::<Vec<String>>().join(", ")
         }
         other => other.to_string(),
     }
