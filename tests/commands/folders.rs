@@ -463,3 +463,55 @@ fn a_zip_of_a_phones_folder_gives_the_bits_of_the_folder() {
         assert!(said.done().out.contains("Gyroscope.csv"), "{said:?}");
     }
 }
+
+#[test]
+#[cfg_attr(not(has_python), ignore = "needs python3")]
+fn what_a_phone_says_of_its_own_orientation_is_found_in_its_folder_and_its_zip() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    phone(at).write(&at.join("walk"));
+    // The truth, as Sensor Logger writes an orientation, and another file that has one.
+    let truth = std::fs::read_to_string(at.join("truth.csv")).unwrap();
+    let mut lines = truth
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let place = |name: &str| names.iter().position(|n| *n == name).unwrap();
+    let wanted = ["true_ns", "qz", "qy", "qx", "qw"].map(place);
+    let mut own = "time,seconds_elapsed,qz,qy,qx,qw\n".to_owned();
+    for cells in lines {
+        let [time, z, y, x, w] = wanted.map(|n| cells[n]);
+        writeln!(own, "{time},0,{z},{y},{x},{w}").unwrap();
+    }
+    std::fs::write(at.join("walk/Orientation.csv"), &own).unwrap();
+    strapd(at, "replay walk -o out.csv").done();
+    let by_hand = rms(at);
+    let zip = "-m zipfile -c walk.zip walk".split(' ');
+    let made = std::process::Command::new("python3")
+        .current_dir(at)
+        .args(zip)
+        .status();
+    assert!(made.unwrap().success());
+    for reference in ["walk", "walk.zip"] {
+        let ran = strapd(
+            at,
+            &format!("compare out.csv {reference} --json --align heading"),
+        );
+        let found = ran.json()["total"]["rms_deg"].as_f64().unwrap();
+        assert!(
+            (found - by_hand).abs() < 1e-3,
+            "{reference}: {found} {by_hand}"
+        );
+        let text = strapd(at, &format!("compare out.csv {reference}"));
+        let name = format!("{reference}/Orientation.csv");
+        assert!(text.done().out.contains(&name), "{text:?}");
+    }
+    // Of two that may be meant none is taken.
+    std::fs::rename(at.join("walk/Orientation.csv"), at.join("walk/A.csv")).unwrap();
+    std::fs::write(at.join("walk/B.csv"), &own).unwrap();
+    let ran = strapd(at, "compare out.csv walk");
+    assert!(
+        ran.code == Some(1) && ran.err.contains("holds no attitude"),
+        "{ran:?}"
+    );
+}

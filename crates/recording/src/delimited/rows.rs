@@ -249,6 +249,12 @@ impl Table {
         self.has(Column::Mag(0))
     }
 
+    /// Whether rows have a place for an orientation.
+    #[must_use]
+    pub(crate) fn has_orientation(&self) -> bool {
+        self.has(Column::Orientation(0))
+    }
+
     pub(super) fn has(&self, column: Column) -> bool {
         self.columns.iter().any(|(known, _)| *known == Some(column))
     }

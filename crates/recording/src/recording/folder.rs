@@ -27,6 +27,8 @@ pub(super) struct Folder {
     pub(super) format: Format,
     /// Tables with forces or fields of the same recording.
     pub(super) beside: Vec<PathBuf>,
+    /// Table with the orientation that the recorder itself says, where it is not that of the rates.
+    pub(super) orientation: Option<PathBuf>,
     /// The files of a recording that is in several.
     pub(super) parts: Vec<PathBuf>,
 }
@@ -81,6 +83,10 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
     mains.extend(best.iter().map(|file| (file.clone(), Format::Table)));
     match mains.as_slice() {
         [(main, format)] => Ok(Folder {
+            orientation: match format {
+                Format::Table => tables.orientation(main),
+                _ => None,
+            },
             beside: match format {
                 Format::Table => tables.beside(main, warn),
                 _ => Vec::new(),
@@ -109,6 +115,7 @@ fn of_several(path: &Path, several: &[(PathBuf, Format)]) -> Result<Folder> {
             main: path.to_owned(),
             format,
             beside: Vec::new(),
+            orientation: None,
             parts: files,
         });
     }
@@ -133,6 +140,21 @@ impl Tables {
             if found.has_field() {
                 self.fields.push(file.to_owned());
             }
+        }
+    }
+
+    /// The file whose orientations are those of the recording `main`: the only one, or of several the one that is called
+    /// so.
+    fn orientation(&self, main: &Path) -> Option<PathBuf> {
+        if table(main, Wanted::Rates).is_some_and(|own| own.has_orientation()) {
+            return None;
+        }
+        let mut found = self.orientations.iter().filter(|file| *file != main);
+        let mut named = found.clone().filter(|file| stem(file) == "orientation");
+        match (named.next(), found.next(), found.next()) {
+            (Some(named), ..) => Some(named.clone()),
+            (None, only, None) => only.cloned(),
+            _ => None,
         }
     }
 

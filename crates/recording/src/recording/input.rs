@@ -128,6 +128,8 @@ pub struct Input {
     format: Format,
     /// Tables of the same recording.
     beside: Vec<PathBuf>,
+    /// Table of the orientations in the same folder.
+    orientation: Option<PathBuf>,
     /// The files it is in, where it is in several.
     parts: Vec<PathBuf>,
     /// Folder that `name` and its parts lie in, where it came as an archive.
@@ -172,11 +174,29 @@ impl Input {
                 kept: None,
                 format: recognised(path, warn)?,
                 beside: Vec::new(),
+                orientation: None,
                 parts: Vec::new(),
                 unpacked: None,
                 warn: warn.clone(),
             }),
         }
+    }
+
+    /// The table of orientations beside this one, of a folder or an archive whose recorder wrote one.
+    ///
+    /// # Errors
+    /// It cannot be opened.
+    pub fn orientation(&self) -> Result<Option<Input>> {
+        let Some(path) = &self.orientation else {
+            return Ok(None);
+        };
+        let mut found = Input::open(path, &self.warn)?;
+        if let (Some(unpacked), Source::File(archive)) = (&self.unpacked, &self.source) {
+            found.kept = Some(Rereadable::File(Arc::new(open(path)?)));
+            found.name = unpacked.name_of(archive, path);
+            found.unpacked = Some(Arc::clone(unpacked));
+        }
+        Ok(Some(found))
     }
 
     fn of_folder(source: Source, found: Folder, warn: &Warn) -> Input {
@@ -186,6 +206,7 @@ impl Input {
             kept: None,
             format: found.format,
             beside: found.beside,
+            orientation: found.orientation,
             parts: found.parts,
             unpacked: None,
             warn: warn.clone(),
@@ -218,6 +239,7 @@ impl Input {
             kept: Some(Rereadable::Object(object)),
             format,
             beside: Vec::new(),
+            orientation: None,
             parts: Vec::new(),
             unpacked: None,
             warn: warn.clone(),
@@ -259,6 +281,7 @@ impl Input {
             kept: None,
             format: formats.first().map_or(Format::Mcap, |(_, format)| *format),
             beside: Vec::new(),
+            orientation: None,
             source: Source::Parts(paths.clone()),
             parts: paths,
             unpacked: None,
@@ -321,6 +344,7 @@ impl Input {
             source,
             name,
             beside: Vec::new(),
+            orientation: None,
             parts: Vec::new(),
             unpacked: None,
             warn: warn.clone(),

@@ -70,6 +70,10 @@ pub fn read(
     options: &Options,
     pool: &Pool,
 ) -> Result<Track> {
+    // A phone has a file for what it says of its own orientation.
+    if let Some(own) = input.orientation()?.filter(|_| topic.is_none()) {
+        return read(&own, side, topic, options, pool);
+    }
     // They are for the one of the two that is another maker's table.
     let plainly = Options::default();
     let plain = |read: Vec<(Entry, [f64; 3])>| {
