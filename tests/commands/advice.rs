@@ -118,6 +118,25 @@ fn a_trajectory_without_a_heading_is_read_by_its_name() {
 }
 
 #[test]
+fn the_help_of_columns_names_every_role_that_there_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = strapd(dir.path(), "info x.csv --columns nothing=1").err;
+    let (_, roles) = refused.split_once("they are ").unwrap();
+    let help = strapd(dir.path(), "replay --help").out;
+    let (_, of_columns) = help.split_once("--columns <").unwrap();
+    let of_columns = of_columns.get(..700).unwrap();
+    let roles: Vec<&str> = roles.lines().next().unwrap().split(", ").collect();
+    assert!(roles.len() >= 10, "{refused}");
+    for role in roles {
+        let has = of_columns.split(|c: char| !c.is_alphanumeric());
+        assert!(
+            has.into_iter().any(|word| word == role.trim()),
+            "{role}: {of_columns}"
+        );
+    }
+}
+
+#[test]
 fn a_wrong_letter_in_a_name_and_a_recording_in_place_of_an_attitude_are_helped() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();

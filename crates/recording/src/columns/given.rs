@@ -94,9 +94,8 @@ impl FromStr for Columns {
             })?;
             let role = ROLES.iter().find(|(known, _)| *known == name.trim());
             let (name, role) = role.copied().ok_or_else(|| {
-                format!(
-                    "`{name}` is no role; they are gyro, accel, mag, orientation, dq, dv, stamp, dt, counter, sensor"
-                )
+                let known = ROLES.map(|(known, _)| known).join(", ");
+                format!("`{name}` is no role; they are {known}")
             })?;
             if given.iter().any(|before| before.role == role) {
                 return Err(format!("{name} is given twice"));
