@@ -34,6 +34,8 @@ const NOTHING = [NaN, NaN, NaN];
 class Row {
   constructor(id, template, choose) {
     this.id = id;
+    // Of a reference: the sensor whose it is.
+    this.reference = /^(.+) (?:truth|recorded)$/.exec(id)?.[1];
     this.angles = NOTHING;
     this.speed = this.sigma = this.error = this.rate = NaN;
     this.since = performance.now();
@@ -141,11 +143,7 @@ export class Fleet {
 
   // Rows but those of references that belong to one of the others: they are in its error, and in its card.
   get own() {
-    const isOwn = (row) => {
-      const [, of] = /^(.+) (?:truth|recorded)$/.exec(row.id) ?? [];
-      return !this.rows.has(of);
-    };
-    return [...this.rows.values()].filter(isOwn);
+    return [...this.rows.values()].filter((row) => !this.rows.has(row.reference));
   }
 
   get order() {

@@ -29,8 +29,8 @@ pub(crate) struct ClippedRun {
 }
 
 impl ClippedRun {
-    /// Variance, rad^2 about each axis of the body, that a step of `secs` at `rate` (rad/s) adds; the square of the change of the rate
-    /// in that step is `change`.
+    /// Variance, rad^2 about each axis of the body, that a step of `secs` at `rate` (rad/s) adds; the square of the
+    /// change of the rate in that step is `change`.
     #[inline]
     pub(crate) fn add(
         &mut self,

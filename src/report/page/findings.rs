@@ -179,3 +179,35 @@ fn short(value: &Value) -> String {
         other => other.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn evidence_has_units_and_nothing_of_what_is_not_there() {
+        let finding = Finding {
+            evidence: [
+                ("first_at_s", json!(1.5)),
+                (
+                    "sigma",
+                    json!({"heading": {"rms_deg": 2.64}, "is_beyond": true, "leaning_deg": null}),
+                ),
+                ("topics_s", json!(["a", "b"])),
+                ("unit_deg", Value::Null),
+            ]
+            .map(|(key, value)| (key.to_owned(), value))
+            .into_iter()
+            .collect(),
+            severity: Severity::Note,
+            code: "code",
+            topic: String::new(),
+            what: String::new(),
+            advice: String::new(),
+            help: Vec::new(),
+        };
+        let said = "first at: 1.500 s; sigma: heading (rms 2.640 deg); topics s: a, b";
+        assert_eq!(evidence(&finding), said);
+    }
+}

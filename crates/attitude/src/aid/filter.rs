@@ -494,17 +494,18 @@ impl Filter {
             self.state.nominal
         };
         let most = self.settings.jerk * ordinary;
-        if jump.norm_squared() > most * most {
+        let change = jump.norm_squared();
+        if change > most * most {
             let excess = jump.norm() - most;
             self.state
                 .covariance
                 .add_to_attitude((excess * secs).powi(2));
         }
         self.state.report.saturated += u64::from(sample.is_saturated);
-        let unknown =
-            self.state
-                .clipped
-                .add(sample.is_saturated, &sample.rate, jump.norm_squared(), secs);
+        let unknown = self
+            .state
+            .clipped
+            .add(sample.is_saturated, &sample.rate, change, secs);
         for (axis, variance) in unknown.iter().enumerate().filter(|(_, v)| **v > 0.0) {
             let axis = r.column(axis).into_owned();
             self.state.covariance.add_about(&axis, *variance);

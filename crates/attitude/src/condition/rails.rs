@@ -1,9 +1,9 @@
 //! Rates of one topic -> axes that were clipped. Pure.
 //!
 //! A stage of its own because three judge by it: `check` as recorded, a replay before its first sample, which then
-//! treats the samples at that level as it does those at a stated range, and a live stream as it goes. An axis is clipped where it stays at exactly
-//! its largest reading while another axis moves, and jumps onto that level and off it; the smooth top of a coarsely
-//! quantised swing has jumps of one step. `docs/theory/spikes.md` has the numbers.
+//! treats the samples at that level as it does those at a stated range, and a live stream as it goes. An axis is clipped
+//! where it stays at exactly its largest reading while another axis moves, and jumps onto that level and off it; the
+//! smooth top of a coarsely quantised swing has jumps of one step. `docs/theory/spikes.md` has the numbers.
 
 use crate::plausible::are_numbers;
 

@@ -8,7 +8,7 @@ use super::bank::{
     evidence, units,
 };
 use super::refine::refine;
-use super::segment::Segment;
+use super::segment::{Scatter, Segment};
 use super::{Cause, Disagreement};
 use crate::frames::AxisMap;
 use crate::median::median;
@@ -185,12 +185,14 @@ fn units_with_axes(segments: &[&Segment], recorded: f64) -> Option<Finer> {
     let sigma = found.sigma[3] * unit / factor;
     let is_sound = sigma.is_finite() && found.left < LARGEST_FOUND.max(verdict.found);
     // Swings as long as a segment come back whatever their size, and leave little of gravity.
-    let has_gravity = gravity(segments, &found.map) >= LEAST_GRAVITY;
-    let is_unit = units().any(|unit| {
-        let alone = scatters(last, &Matrix3::from_diagonal_element(unit));
-        alone.is_some_and(|alone| wanders(&alone) <= verdict.found)
-    });
-    (is_sound && has_gravity && !is_unit).then_some(Finer {
+    let has_gravity = || gravity(segments, &found.map).is_some_and(|g| g >= LEAST_GRAVITY);
+    let is_unit = || {
+        units().any(|unit| {
+            let alone = scatters(last, &Matrix3::from_diagonal_element(unit));
+            alone.is_some_and(|alone| wanders(&alone) <= verdict.found)
+        })
+    };
+    (is_sound && has_gravity() && !is_unit()).then_some(Finer {
         kind: Kind::UnitAndAxes {
             axes: AxisMap::from_matrix(&axes)?,
             decided,
@@ -338,21 +340,26 @@ impl Judged {
 
 /// Scatter of gravity in each segment under a map, with the bias that suits it best, g^2.
 fn scatters(segments: &[&Segment], map: &Matrix3<f64>) -> Option<Vec<f64>> {
-    let bias = refine::<3>(segments.iter().copied(), map, &[])?.bias;
-    let of = segments.iter().map(|segment| {
-        let found = segment.scatter::<3>(map, &[], &bias);
+    each(segments, map, |found| {
         let missing = (LEAST_GRAVITY - found.gravity).max(0.0);
         found.s.max(0.0) + missing * missing
-    });
-    Some(of.collect())
+    })
+}
+
+/// View of gravity in each segment under a map, with the bias that suits it best.
+fn each(
+    segments: &[&Segment],
+    map: &Matrix3<f64>,
+    seen: impl Fn(&Scatter<3>) -> f64,
+) -> Option<Vec<f64>> {
+    let bias = refine::<3>(segments.iter().copied(), map, &[])?.bias;
+    let of = |segment: &&Segment| seen(&segment.scatter::<3>(map, &[], &bias));
+    Some(segments.iter().map(of).collect())
 }
 
 /// Median mean force under a map, g.
-fn gravity(segments: &[&Segment], map: &Matrix3<f64>) -> f64 {
-    let bias = refine::<3>(segments.iter().copied(), map, &[]).map(|found| found.bias);
-    let bias = bias.unwrap_or_default();
-    let of = |segment: &&Segment| segment.scatter::<3>(map, &[], &bias).gravity;
-    median(&mut segments.iter().map(of).collect::<Vec<f64>>())
+fn gravity(segments: &[&Segment], map: &Matrix3<f64>) -> Option<f64> {
+    each(segments, map, |found| found.gravity).map(|mut found| median(&mut found))
 }
 
 fn rotation(by: &Vector3<f64>) -> Matrix3<f64> {

@@ -124,7 +124,7 @@ impl Whole {
     /// Puts the next part, in the order of their times (first and last), behind the others.
     ///
     /// # Errors
-    /// It is of the time of the one before it, or of other sensors.
+    /// The part is of the time of the one before it, or of other sensors.
     pub(super) fn add(
         &mut self,
         (name, now): (&Path, (u64, u64)),
