@@ -116,6 +116,43 @@ fn a_recorded_orientation_in_a_table_is_a_reference() {
     );
 }
 
+#[test]
+fn a_capture_holds_the_orientation_of_its_device_as_a_reference() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    std::fs::copy(fixture("ximu3.mcap"), at.join("ximu3.mcap")).unwrap();
+    // The same numbers as the device sends them.
+    let mut messages = Vec::new();
+    for (letter, name) in [('I', "ximu3_inertial.csv"), ('Q', "ximu3_quaternion.csv")] {
+        let table = std::fs::read_to_string(source(name)).unwrap();
+        let rows = table.lines().skip(1);
+        messages.extend(rows.map(|row| {
+            let stamp: u64 = row.split(',').next().unwrap().parse().unwrap();
+            (stamp, format!("{letter},{row}\r\n"))
+        }));
+    }
+    messages.sort();
+    let bytes: String = messages.into_iter().map(|(_, text)| text).collect();
+    std::fs::write(at.join("capture.bin"), bytes).unwrap();
+    let against = |log: &str| {
+        let flags = "--sample-kind average --against-recorded --force -o a.csv --json";
+        let ran = strapd(at, &format!("replay {log} {flags}")).done().json();
+        let topic = &ran["topics"][0];
+        let figure = |value: &serde_json::Value| value.as_f64().unwrap();
+        let kinds = topic["against_recorded"].as_array().unwrap();
+        let medians = kinds.iter().map(|kind| figure(&kind["median_deg"]));
+        let sigma = &topic["recorded"]["sigma"];
+        let rms = ["tilt", "heading"].map(|name| figure(&sigma[name]["rms_deg"]));
+        medians.chain(rms).collect::<Vec<f64>>()
+    };
+    let (capture, log) = (against("capture.bin"), against("ximu3.mcap"));
+    assert_eq!(capture.len(), 6);
+    for (one, other) in capture.iter().zip(&log) {
+        // The device sends f32.
+        assert!((one - other).abs() < 1e-4, "{capture:?} {log:?}");
+    }
+}
+
 /// Samples as a maker writes them, and the same in SI.
 struct Made {
     name: &'static str,

@@ -17,6 +17,7 @@ mod link;
 mod mip;
 mod motion;
 mod numbers;
+mod orientation;
 mod reader;
 mod recognise;
 mod sample;
@@ -70,7 +71,7 @@ pub const PROTOCOLS: &[Protocol] = &[
     Protocol {
         name: "ximu3",
         title: "x-IMU3",
-        carries: "inertial and magnetometer messages, binary and ASCII, also through a multiplexer",
+        carries: "inertial, magnetometer and orientation messages, binary and ASCII, also through a multiplexer",
         cut: ximu3::cut,
         opens: Opens::Device(|| Box::new(ximu3::Ximu3)),
     },
@@ -84,21 +85,21 @@ pub const PROTOCOLS: &[Protocol] = &[
     Protocol {
         name: "witmotion",
         title: "WitMotion",
-        carries: "frames 0x50 (time), 0x51 (acceleration), 0x52 (rate), 0x54 (field)",
+        carries: "frames 0x50 (time), 0x51 (acceleration), 0x52 (rate), 0x53 (angles), 0x54 (field), 0x59 (quaternion)",
         cut: witmotion::cut,
         opens: Opens::Device(|| Box::new(witmotion::WitMotion::default())),
     },
     Protocol {
         name: "vectornav",
         title: "VectorNav",
-        carries: "binary groups 1 to 3 (DeltaTheta, AngularRate, UncompGyro), $VNYMR, $VNIMU",
+        carries: "binary groups 1 to 3 and 5 (DeltaTheta, AngularRate, UncompGyro, Quaternion), $VNYMR, $VNQMR, $VNIMU",
         cut: vectornav::cut,
         opens: Opens::Device(|| Box::new(vectornav::VectorNav::default())),
     },
     Protocol {
         name: "mip",
         title: "MicroStrain MIP",
-        carries: "set 0x80: delta theta or scaled gyro; scaled accelerometer and magnetometer",
+        carries: "set 0x80: delta theta or scaled gyro; scaled accelerometer and magnetometer; orientation of sets 0x80 and 0x82",
         cut: mip::cut,
         opens: Opens::Device(|| Box::new(mip::Mip::default())),
     },

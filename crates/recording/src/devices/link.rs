@@ -5,7 +5,7 @@
 
 use super::auto::{Auto, Found, PATIENCE};
 use super::reader::Reader;
-use super::sample::name;
+use super::sample::{Sample, name};
 use super::{Asked, Opens, Protocol};
 use crate::mavlink;
 use crate::records::problem::ProblemKind;
@@ -216,7 +216,9 @@ impl State {
             State::Mavlink(_, link) => link.push(bytes, prefix, lines),
             State::Device(protocol, reader) => {
                 reader.push(bytes);
-                for sample in reader.taken.samples.drain(..) {
+                // An attitude of the device's own is none that a daemon takes.
+                let samples = reader.taken.samples.drain(..);
+                for sample in samples.filter(Sample::has_motion) {
                     sample.line(&name(prefix.unwrap_or(protocol.name), sample.unit), lines);
                 }
             }

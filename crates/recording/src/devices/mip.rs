@@ -1,17 +1,19 @@
 //! Packets of a MicroStrain sensor (MIP) -> a sample. Pure.
 //!
-//! A packet is fields of one set; those of set 0x80 are read. Delta angles are taken before rates, by the first packet
+//! A packet is fields of one set; those of set 0x80 are read, and of set 0x82 the orientation. Delta angles are taken before rates, by the first packet
 //! that has either. Axes are forward, right, down on the wire, accelerations in g.
 //!
 //! # Source
 //! 3DM-GX5/CV7 Data Communications Protocol (MicroStrain by HBK): sets, fields, checksum. Numbers of fields as in the
 //! maker's library (PyPI `pymscl` 68.4, `MipTypes`); the public crate of mcbridejc/microstrain-inertial reads the same.
+//! An orientation q turns the vehicle to north, east, down: v_vehicle = q^-1 v_ned q (Data Communications Protocol, 0x82 0x03).
 
 use super::Device;
 use super::clock::{Counter, mean_force};
 use super::frame::{Cut, may_begin};
 use super::motion::Choice;
 use super::numbers::{G, array, f32_be, scaled};
+use super::orientation::{Orientation, four, of_angles, of_ned, unit};
 use super::sample::{Sample, Taken};
 use crate::records::imu::flu;
 use strapd_attitude::record::SampleKind;
@@ -19,6 +21,8 @@ use strapd_attitude::record::SampleKind;
 const MARK: [u8; 2] = [0x75, 0x65];
 /// Set of the sensors.
 const SENSORS: u8 = 0x80;
+/// Set of the filter.
+const FILTER: u8 = 0x82;
 /// Nanoseconds of a tick of the internal clock: 62.5 kHz.
 const TICK: u64 = 16_000;
 /// Seconds of a week.
@@ -92,14 +96,16 @@ struct Packet {
     force: Option<[f64; 3]>,
     velocity: Option<[f64; 3]>,
     field: Option<[f64; 3]>,
+    quaternion: Option<Orientation>,
+    angles: Option<Orientation>,
     is_clipped: bool,
 }
 
 impl Device for Mip {
     fn take(&mut self, frame: &[u8], to: &mut Taken) {
-        if frame.get(2) != Some(&SENSORS) {
+        let Some(&set @ (SENSORS | FILTER)) = frame.get(2) else {
             return;
-        }
+        };
         let mut rest = frame.get(4..frame.len().saturating_sub(2)).unwrap_or(&[]);
         let mut packet = Packet::default();
         // A field's length counts its own two bytes of head.
@@ -108,7 +114,10 @@ impl Device for Mip {
                 break;
             };
             if let [_, descriptor, data @ ..] = field {
-                self.field(*descriptor, data, &mut packet);
+                match set {
+                    SENSORS => self.field(*descriptor, data, &mut packet),
+                    _ => filtered(*descriptor, data, &mut packet),
+                }
             }
             rest = behind;
         }
@@ -126,6 +135,8 @@ impl Mip {
             0x06 => packet.field = vector(),
             0x07 => packet.angle = vector(),
             0x08 => packet.velocity = vector(),
+            0x0a => packet.quaternion = of_wxyz(data),
+            0x0c => packet.angles = of_roll_pitch_yaw(data),
             0x0e => {
                 let count = array(data, 0).map(u32::from_be_bytes);
                 let ticks = count.map(|n| self.ticks.goes_on(u64::from(n)));
@@ -155,12 +166,33 @@ impl Mip {
             rate: motion.map(|(rate, _)| flu(rate)),
             force: force.map(|force| flu(scaled(force, G))),
             field: packet.field.map(flu),
-            ..Sample::default()
+            orientation: packet.quaternion.or(packet.angles),
+            unit: None,
         });
         if motion.is_some() {
             self.before = time;
         }
     }
+}
+
+/// Reads a field of the filter's set; an orientation is followed by whether it is valid.
+fn filtered(descriptor: u8, data: &[u8], packet: &mut Packet) {
+    let is_valid = |at| array(data, at).is_some_and(|flags| u16::from_be_bytes(flags) != 0);
+    match descriptor {
+        0x03 if is_valid(16) => packet.quaternion = of_wxyz(data),
+        0x05 if is_valid(12) => packet.angles = of_roll_pitch_yaw(data),
+        0x11 | 0xd3 => packet.gps = gps(data),
+        0xd5 => packet.reference = array(data, 0).map(u64::from_be_bytes),
+        _ => {}
+    }
+}
+
+fn of_wxyz(data: &[u8]) -> Option<Orientation> {
+    Some(of_ned(&unit(four(data, 0, f32::from_be_bytes)?)?))
+}
+
+fn of_roll_pitch_yaw(data: &[u8]) -> Option<Orientation> {
+    Some(of_ned(&of_angles(f32_be(data, 0)?)?))
 }
 
 /// Nanoseconds since 1970, without leap seconds, of a time of week and a week; `None` of a time that cannot be.

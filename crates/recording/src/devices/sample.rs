@@ -39,10 +39,10 @@ impl Taken {
     /// Adds a sample, if its numbers are some.
     pub(super) fn add(&mut self, sample: Sample) {
         let vectors = [sample.rate, sample.force, sample.field];
-        let mut numbers = vectors.iter().flatten().flatten();
-        if numbers.all(|number| number.is_finite())
-            && (sample.rate.is_some() || sample.field.is_some())
-        {
+        let orientation = sample.orientation.iter().flatten();
+        let mut numbers = vectors.iter().flatten().flatten().chain(orientation);
+        let is_some = sample.has_motion() || sample.orientation.is_some();
+        if numbers.all(|number| number.is_finite()) && is_some {
             self.samples.push(sample);
         }
     }
@@ -58,6 +58,11 @@ pub(super) fn name(of: &str, unit: Option<u8>) -> String {
 }
 
 impl Sample {
+    /// Whether it has what a filter takes: a rate or a field.
+    pub(super) fn has_motion(&self) -> bool {
+        self.rate.is_some() || self.field.is_some()
+    }
+
     /// Appends the line that a daemon reads.
     pub(super) fn line(&self, id: &str, to: &mut Vec<u8>) {
         let vectors = [
@@ -76,6 +81,11 @@ impl Sample {
             let numbers = out.get_mut(place..).unwrap_or_default();
             put(numbers, imu::ORIENTATION, [x, y, z, w, 0.0]);
         }
+    }
+
+    /// Writes the orientation in place of what is in `out`, as ROS's `QuaternionStamped`.
+    pub(super) fn attitude(&self, [w, x, y, z]: [f64; 4], out: &mut Vec<u8>) {
+        imu::attitude(out, self.header(), [x, y, z, w]);
     }
 
     /// Writes the field in place of what is in `out`, as ROS's `MagneticField`.

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing)]
 
 mod made;
+mod orientation;
 
 use super::reader::Reader;
 use super::sample::Sample;

@@ -25,6 +25,8 @@ enum Content {
     /// Rates, of a kind that the protocol says, or not.
     Rates(Option<&'static str>),
     Field,
+    /// Orientations that come in messages of their own.
+    Orientation,
 }
 
 /// A capture under way.
@@ -130,6 +132,10 @@ impl Transcriber {
                 sample.magnetic(field, &mut message);
                 self.put(protocol, sample, Content::Field, &message, to);
             }
+            if let (None, Some(orientation)) = (sample.rate, sample.orientation) {
+                sample.attitude(orientation, &mut message);
+                self.put(protocol, sample, Content::Orientation, &message, to);
+            }
             self.message = message;
         }
     }
@@ -160,14 +166,17 @@ impl Transcriber {
         let (schema, of) = match content {
             Content::Rates(_) => (1, imu::TYPE),
             Content::Field => (2, imu::FIELD_TYPE),
+            Content::Orientation => (3, imu::ATTITUDE_TYPE),
         };
         if self.schemas.insert(schema) {
             let text = known_definition(of).unwrap_or_default();
             to.schema(schema, of, "ros2msg", text.as_bytes());
         }
+        let of = name(protocol.name, unit);
         let (topic, kind) = match content {
-            Content::Rates(kind) => (name(protocol.name, unit), kind),
-            Content::Field => (format!("{}/mag", name(protocol.name, unit)), None),
+            Content::Rates(kind) => (of, kind),
+            Content::Field => (format!("{of}/mag"), None),
+            Content::Orientation => (format!("{of}/orientation"), None),
         };
         let kind = kind.map(|kind| (SAMPLE_KIND.name(), kind));
         to.channel(number, schema, &topic, "cdr", kind.as_slice());

@@ -14,6 +14,7 @@ use super::clock::mean_force;
 use super::frame::{Cut, may_begin};
 use super::motion::Choice;
 use super::numbers::{array, f32_le, scaled};
+use super::orientation::{Orientation, four, of_angles, of_ned, unit};
 use super::sample::{Sample, Taken};
 use crate::records::imu::flu;
 use strapd_attitude::record::SampleKind;
@@ -142,6 +143,8 @@ struct Message {
     velocity: Option<[f64; 3]>,
     field: Option<[f64; 3]>,
     raw_field: Option<[f64; 3]>,
+    quaternion: Option<Orientation>,
+    angles: Option<Orientation>,
     is_clipped: bool,
 }
 
@@ -175,7 +178,8 @@ impl VectorNav {
             rate: motion.map(|(rate, _)| flu(rate)),
             force: force.or_else(|| message.velocity.and_then(mean)).map(flu),
             field: message.field.or(message.raw_field).map(flu),
-            ..Sample::default()
+            orientation: message.quaternion.or(message.angles),
+            unit: None,
         });
         if motion.is_some() {
             self.before = time;
@@ -205,6 +209,8 @@ fn read(group: usize, field: usize, frame: &[u8], at: usize, to: &mut Message) {
     match (group, field) {
         (1 | 2, 0) => to.time = time(),
         (1 | 2, 1) => to.gps_time = time(),
+        (1, 3) | (5, 1) => to.angles = vector(at).and_then(of_yaw_pitch_roll),
+        (1, 4) | (5, 2) => to.quaternion = four(frame, at, f32::from_le_bytes).and_then(of_xyzw),
         (1, 5) | (3, 10) => to.rate = vector(at),
         (1, 8) | (3, 9) => to.force = vector(at),
         (1, 9) => (to.raw_force, to.raw_rate) = (vector(at), vector(at + 12)),
@@ -223,25 +229,43 @@ fn read(group: usize, field: usize, frame: &[u8], at: usize, to: &mut Message) {
     }
 }
 
-/// Message of an ASCII line that has field, force and rate one after another.
+/// Orientation of angles in degrees.
+fn of_yaw_pitch_roll([yaw, pitch, roll]: [f64; 3]) -> Option<Orientation> {
+    let q = of_angles(scaled([roll, pitch, yaw], 1f64.to_radians()))?;
+    Some(of_ned(&q))
+}
+
+/// Orientation of a quaternion whose scalar is the last.
+fn of_xyzw([x, y, z, w]: [f64; 4]) -> Option<Orientation> {
+    Some(of_ned(&unit([w, x, y, z])?))
+}
+
+/// Message of an ASCII line that has field, force and rate one after another, some behind an orientation.
 fn text(frame: &[u8]) -> Option<Message> {
     let text = std::str::from_utf8(frame).ok()?;
     let (body, _) = text.split_once('*')?;
     let mut cells = body.split(',');
     let skipped = match cells.next()? {
         "$VNYMR" => 3,
+        "$VNQMR" => 4,
         "$VNIMU" => 0,
         _ => return None,
     };
-    let numbers: Vec<f64> = cells
-        .skip(skipped)
-        .map_while(|cell| cell.parse().ok())
-        .collect();
-    let at = |n: usize| numbers.get(n..).and_then(<[f64]>::first_chunk).copied();
+    let numbers: Vec<f64> = cells.map_while(|cell| cell.parse().ok()).collect();
+    let at = |n: usize| {
+        numbers
+            .get(skipped + n..)
+            .and_then(<[f64]>::first_chunk)
+            .copied()
+    };
+    let angles = numbers.first_chunk().copied().filter(|_| skipped == 3);
+    let quaternion = numbers.first_chunk().copied().filter(|_| skipped == 4);
     Some(Message {
         field: at(0),
         force: at(3),
         rate: at(6),
+        angles: angles.and_then(of_yaw_pitch_roll),
+        quaternion: quaternion.and_then(of_xyzw),
         ..Message::default()
     })
 }

@@ -1,7 +1,7 @@
 //! Frames of WitMotion's standard protocol -> a sample. Pure.
 //!
 //! A cycle consists of frames of eleven bytes, one for each quantity, in the order of their numbers: time, acceleration, rate,
-//! angle, field. The rate makes the sample, with the acceleration and the time that came before it in the cycle; nothing
+//! angles, field, quaternion. The rate makes the sample, with the acceleration and the time that came before it in the cycle; nothing
 //! waits for the next. Axes are those printed on the case, right-handed, z up: taken as they come.
 //!
 //! # Source
@@ -11,8 +11,10 @@
 use super::Device;
 use super::frame::{Cut, sum};
 use super::numbers::{G, array, i16_le, scaled};
+use super::orientation::{of_angles, unit};
 use super::sample::{Sample, Taken};
 use crate::decode::days_since_1970;
+use std::f64::consts::PI;
 
 const MARK: u8 = 0x55;
 /// Bytes of a frame.
@@ -40,8 +42,11 @@ pub(super) struct WitMotion {
     /// Time and acceleration of this cycle.
     time: Option<u64>,
     force: Option<[f64; 3]>,
-    /// Time of the rate of this cycle, for the field behind it.
-    told: Option<Option<u64>>,
+    /// Time of the rate of this cycle, for the field and for the orientation behind it.
+    for_field: Option<Option<u64>>,
+    for_orientation: Option<u64>,
+    /// Number of the frames whose orientation is taken: the first that came.
+    orientation: Option<u8>,
     /// Whether the device sends its time.
     has_clock: bool,
 }
@@ -62,10 +67,10 @@ impl Device for WitMotion {
                 // One without its time would be stamped otherwise than its neighbours.
                 if self.has_clock && time.is_none() {
                     to.missing += 1;
-                    self.told = None;
+                    (self.for_field, self.for_orientation) = (None, None);
                     return;
                 }
-                self.told = Some(time);
+                (self.for_field, self.for_orientation) = (Some(time), time);
                 to.add(Sample {
                     time,
                     rate: Some(scaled(vector, 2000f64.to_radians() / FULL)),
@@ -74,17 +79,44 @@ impl Device for WitMotion {
                 });
             }
             Some(0x54) => {
-                let Some(time) = self.told.take() else {
-                    return;
-                };
-                to.add(Sample {
-                    time,
-                    field: Some(vector),
-                    ..Sample::default()
-                });
+                if let Some(time) = self.for_field.take() {
+                    to.add(Sample {
+                        time,
+                        field: Some(vector),
+                        ..Sample::default()
+                    });
+                }
             }
+            Some(&number @ (0x53 | 0x59)) => self.orientation(number, frame, to),
             _ => {}
         }
+    }
+}
+
+impl WitMotion {
+    /// Tells the orientation of a frame of angles (roll, pitch, yaw), or of a quaternion, to east, north, up.
+    fn orientation(&mut self, number: u8, frame: &[u8], to: &mut Taken) {
+        if *self.orientation.get_or_insert(number) != number {
+            return;
+        }
+        // Without a time it belongs to no instant.
+        let Some(time) = self.for_orientation.take() else {
+            return;
+        };
+        let part = |at| Some(f64::from(i16::from_le_bytes(array(frame, at)?)) / FULL);
+        let parts = [part(2), part(4), part(6), part(8)];
+        let q = match (number, parts) {
+            (0x59, [Some(w), Some(x), Some(y), Some(z)]) => unit([w, x, y, z]),
+            (_, [Some(roll), Some(pitch), Some(yaw), _]) => {
+                of_angles([roll, pitch, yaw].map(|half_turns| half_turns * PI))
+            }
+            _ => None,
+        };
+        to.add(Sample {
+            time: Some(time),
+            orientation: q.map(|q| q.wxyz()),
+            ..Sample::default()
+        });
     }
 }
 

@@ -10,7 +10,8 @@
 
 use super::Device;
 use super::frame::Cut;
-use super::numbers::{G, array, f32_le, scaled};
+use super::numbers::{G, array, scaled};
+use super::orientation::{Orientation, of_angles, of_nwu, unit};
 use super::sample::{Sample, Taken};
 
 /// Mark of the multiplexer.
@@ -144,23 +145,23 @@ impl Device for Ximu3 {
 /// The sample of a message, if it has one.
 fn sample(body: &[u8]) -> Option<Sample> {
     let first = *body.first()?;
-    let (time, head, tail) = match first < 0x80 {
+    let (time, numbers) = match first < 0x80 {
         true => {
             let (time, numbers) = text_numbers(body)?;
             // As binary, so that both give the same bits.
-            let numbers: Vec<f64> = numbers.iter().map(|n| f64::from(*n as f32)).collect();
-            (
-                time,
-                numbers.first_chunk().copied()?,
-                numbers.get(3..).and_then(<[f64]>::first_chunk).copied(),
-            )
+            (time, numbers.iter().map(|n| *n as f32).collect())
         }
         false => {
             let body = unstuffed(body)?;
-            let time = u64::from_le_bytes(array(&body, 1)?);
-            (time, f32_le(&body, 9)?, f32_le(&body, 21))
+            let numbers = body.get(9..)?.chunks_exact(4);
+            let numbers: Vec<f32> = numbers
+                .map_while(|four| Some(f32::from_le_bytes(array(four, 0)?)))
+                .collect();
+            (u64::from_le_bytes(array(&body, 1)?), numbers)
         }
     };
+    let numbers: Vec<f64> = numbers.into_iter().map(f64::from).collect();
+    let head = numbers.first_chunk().copied()?;
     let sample = Sample {
         time: Some(time.saturating_mul(1000)),
         ..Sample::default()
@@ -169,7 +170,7 @@ fn sample(body: &[u8]) -> Option<Sample> {
         // deg/s and g.
         b'I' => Some(Sample {
             rate: Some(scaled(head, 1f64.to_radians())),
-            force: tail.map(|force| scaled(force, G)),
+            force: numbers.last_chunk().map(|force| scaled(*force, G)),
             ..sample
         }),
         // Its unit is that of its calibration, in which the Earth's field is 1.
@@ -177,6 +178,20 @@ fn sample(body: &[u8]) -> Option<Sample> {
             field: Some(head),
             ..sample
         }),
-        _ => None,
+        letter => Some(Sample {
+            orientation: Some(orientation(letter, &numbers)?),
+            ..sample
+        }),
     }
+}
+
+/// Orientation of a message of the device's own filter, to north, west, up as it leaves the factory. Of its five forms it
+/// sends one; the matrix is left out.
+fn orientation(letter: u8, numbers: &[f64]) -> Option<Orientation> {
+    let q = match letter {
+        b'Q' | b'L' | b'E' => unit(numbers.first_chunk().copied()?)?,
+        b'A' => of_angles(scaled(numbers.first_chunk().copied()?, 1f64.to_radians()))?,
+        _ => return None,
+    };
+    Some(of_nwu(&q))
 }

@@ -151,7 +151,7 @@ impl Xsens {
             (None, packet.rate_hr),
         ]);
         let Some((rate, kind)) = motion else {
-            return self.tell_field(packet, to);
+            return self.tell_rest(packet, to);
         };
         let mean = |velocity| mean_force(velocity, self.before, packet.time);
         to.add(Sample {
@@ -166,11 +166,12 @@ impl Xsens {
         self.before = packet.time;
     }
 
-    /// Tells the field of a packet without motion.
-    fn tell_field(&self, packet: &Packet, to: &mut Taken) {
+    /// Tells field and orientation of a packet without motion.
+    fn tell_rest(&self, packet: &Packet, to: &mut Taken) {
         to.add(Sample {
             time: packet.time,
             field: packet.field,
+            orientation: packet.orientation,
             ..Sample::default()
         });
     }
