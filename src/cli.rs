@@ -4,6 +4,7 @@
 
 pub mod admission;
 pub mod allan;
+pub mod borrowed;
 pub mod calibrate;
 mod calibration_files;
 pub mod cat;

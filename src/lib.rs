@@ -82,7 +82,7 @@ pub fn main() -> ExitCode {
     let _ = strapd_recording::remote_object::reach_by(store::reach);
     #[cfg(feature = "object-store")]
     let _ = sink::upload::upload_by(store::upload::WAY);
-    let cli = cli::Cli::parse();
+    let cli = cli::Cli::try_parse().unwrap_or_else(|error| cli::borrowed::explained(error).exit());
     cli::start_diagnostics(&cli.global);
     size_limit::make_size_limit_an_error();
     match cli::run(cli) {

@@ -151,6 +151,15 @@ impl Format {
         ROWS.iter().find(has).map(|row| row.format)
     }
 
+    /// Ending of a format that holds this one, or that it holds.
+    pub(super) fn like(ending: &str) -> Option<&'static str> {
+        if ending.len() < 3 {
+            return None;
+        }
+        let mut known = ROWS.iter().flat_map(|row| row.endings).rev().copied();
+        known.find(|known| known.contains(ending) || ending.contains(known))
+    }
+
     /// Feature that this build lacks for it.
     pub(super) fn missing(self) -> Option<&'static Feature> {
         let row = self.row();

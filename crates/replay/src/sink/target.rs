@@ -192,7 +192,12 @@ impl Target {
             return refuse(what, known());
         };
         let Some(format) = Format::of_ending(&ending) else {
-            return refuse(format!("unknown extension `.{ending}`"), known());
+            let files = format!("files: {}", Format::files());
+            let help = match Format::like(&ending) {
+                Some(like) => format!("-o {}? {files}", path.with_extension(like).display()),
+                None => files,
+            };
+            return refuse(format!("unknown extension `.{ending}`"), help);
         };
         if let Some(feature) = format.missing() {
             let (instead, readers) = feature.instead;
@@ -252,12 +257,31 @@ mod tests {
             match Target::parse(text) {
                 Err(Error::Usage(message)) => {
                     let help = message.helping().unwrap_or_default();
-                    assert!(help.contains("known sinks: FILE.mcap"), "{message}");
+                    // Who wrote an ending wants a file.
+                    let begins = if text == "out.bag" {
+                        "files: "
+                    } else {
+                        "known sinks: "
+                    };
+                    assert!(help.starts_with(&format!("{begins}FILE.mcap")), "{message}");
                 }
                 // Path::extension reads `x.mcap/` as `x.mcap`: a file name with a slash is the
                 // opener's business.
                 other => assert_eq!(text, "x.mcap/", "{other:?}"),
             }
+        }
+    }
+
+    #[test]
+    fn an_ending_that_is_nearly_one_is_answered_with_it() {
+        for (text, like) in [
+            ("x.json", "x.jsonl? "),
+            ("a.b.JSON", "a.b.jsonl? "),
+            ("x.csvx", "x.csv? "),
+        ] {
+            let said = Target::parse(text).unwrap_err().to_string();
+            assert!(said.contains(&format!("-o {like}")), "{said}");
+            assert!(said.len() < 400, "{said}");
         }
     }
 
