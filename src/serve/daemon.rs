@@ -242,7 +242,7 @@ impl Server {
     }
 }
 
-/// Sees to it that samples do not wait for ever for the unit of their stamps.
+/// Sees to it that samples do not wait forever for the unit of their stamps.
 async fn end_waits(hub: Arc<Hub>) {
     let mut tick = tokio::time::interval(hub::TICK);
     loop {

@@ -302,7 +302,7 @@ fn a_named_pipe_is_read_like_standard_input() {
         .arg("replay")
         .arg(&pipe)
         .args(["-o", "-"])
-        // A second open of the pipe would wait for a second writer, for ever: by the clock, as a last resort.
+        // A second open of the pipe would wait for a second writer, forever: by the clock, as a last resort.
         .timeout(std::time::Duration::from_secs(600))
         .output()
         .unwrap();

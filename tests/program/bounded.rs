@@ -10,7 +10,7 @@ use std::time::Duration;
 /// Processor seconds of one process: what tests ask for takes up to ten, without optimisation.
 pub const CPU_SECS: u64 = 60;
 
-/// Bound by the clock, for what waits for ever and uses none.
+/// Bound by the clock, for what waits forever and uses none.
 const LAST_RESORT: Duration = Duration::from_secs(10 * CPU_SECS);
 
 /// Runs a command to its end, with this on its standard input.

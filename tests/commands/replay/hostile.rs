@@ -215,7 +215,7 @@ fn the_log_that_hangs_the_mcap_crate_ends_at_once() {
     };
     let took = begun.elapsed();
     eprintln!("the hang file ended after {took:?} (target 100 ms)");
-    // Fifty times the target: a debug build on a machine shared by many. A hang takes for ever.
+    // Fifty times the target: a debug build on a machine shared by many. A hang takes forever.
     assert!(took < Duration::from_secs(5), "{took:?}");
     // Five chunks, two of them broken, leave 141 messages; their payloads are noise, not an Imu.
     assert_verdicts(only(&summary), &[(Verdict::Undecodable, 141)]);

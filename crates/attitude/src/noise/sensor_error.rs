@@ -250,7 +250,7 @@ impl ImuError {
         let fault = |what: String| Err(ImuErrorFault(what.into()));
         if self.bandwidth_hz.is_some() && self.damping < 0.05 {
             return fault(format!(
-                "damping={}: below 0.05 the low-pass rings for ever",
+                "damping={}: below 0.05 the low-pass rings forever",
                 self.damping
             ));
         }

@@ -1,7 +1,7 @@
 //! Velocities and positions of the nodes -> how far a body like this one strays. Pure.
 //!
 //! A stage of its own because it stands for a low pass of the acceleration: a hand, a machine, a gait do not
-//! accelerate away for ever, and how far they go is learned from the log itself.
+//! accelerate away forever, and how far they go is learned from the log itself.
 //!
 //! Position about its centre is a stationary process of Matern's covariance with `nu` 3/2, each axis by itself:
 //! `s^2 (1 + l t) exp(-l t)`, whose velocity has the variance `(l s)^2` (state and transition: Hartikainen, Sarkka

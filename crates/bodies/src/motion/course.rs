@@ -145,7 +145,7 @@ impl Steps {
         Self {
             start,
             period,
-            // What rounding leaves of a way back to the start would grow for ever.
+            // What rounding leaves of a way back to the start would grow forever.
             gain: if gain.abs() < 1e-12 { 0.0 } else { gain },
             steps,
         }

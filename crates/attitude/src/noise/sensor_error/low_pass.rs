@@ -41,7 +41,7 @@ pub(super) struct LowPass {
 }
 
 impl LowPass {
-    /// Begins as if the first interval's line had been running for ever: without a transient.
+    /// Begins as if the first interval's line had been running forever: without a transient.
     pub(super) fn new(hz: f64, zeta: f64, first: &Course, secs: f64) -> LowPass {
         let w = 2.0 * std::f64::consts::PI * hz;
         let slope = (first.end - first.start) / secs;
