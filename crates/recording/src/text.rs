@@ -9,7 +9,12 @@ pub const MAX_NEAR: usize = 64;
 /// `text` fit for a terminal: at most 255 bytes, control and other invisible characters escaped.
 #[must_use]
 pub fn printable(text: &str) -> String {
-    let mut out = String::with_capacity(text.len().min(255));
+    escaped(text, 255)
+}
+
+/// As many whole characters of `text`, escaped, as go into `most` bytes.
+fn escaped(text: &str, most: usize) -> String {
+    let mut out = String::with_capacity(text.len().min(most));
     for c in text.chars() {
         let start = out.len();
         if c.is_control() || is_invisible(c) {
@@ -17,7 +22,7 @@ pub fn printable(text: &str) -> String {
         } else {
             out.push(c);
         }
-        if out.len() > 255 {
+        if out.len() > most {
             out.truncate(start);
             break;
         }
@@ -40,15 +45,7 @@ fn is_invisible(c: char) -> bool {
 #[must_use]
 pub fn snippet(bytes: &[u8]) -> String {
     let head = bytes.get(..bytes.len().min(MAX_NEAR)).unwrap_or_default();
-    let mut out = String::new();
-    for c in String::from_utf8_lossy(head).chars() {
-        let escaped = printable(c.encode_utf8(&mut [0; 4]));
-        if out.len() + escaped.len() > MAX_NEAR {
-            break;
-        }
-        out.push_str(&escaped);
-    }
-    out
+    escaped(&String::from_utf8_lossy(head), MAX_NEAR)
 }
 
 /// A text without the byte order mark that spreadsheets put before it.
