@@ -30,6 +30,9 @@ const LEAST_SOON: f64 = 3.0;
 /// Factors of each axis and turns (rad) about single ones from which a refinement starts.
 const FACTORS: [f64; 3] = [1.0, 0.5, 2.0];
 const TURNS: [f64; 2] = [-0.8, 0.8];
+/// Largest scatter that a few segments may have under their best map, by the largest of a map that is found: what only
+/// accelerates has more.
+const HOPEFUL: f64 = 2.0;
 /// Rounds of refinement of a turn: directions are straight, and a turn is not.
 const ROUNDS: usize = 3;
 /// Evidence of a segment that tells something about a refined map, and how many such there must be.
@@ -216,10 +219,27 @@ fn refined(segments: &[&Segment], recorded: &[f64]) -> Option<Finer> {
     let axes: Vec<Matrix3<f64>> = factors.iter().map(Matrix3::from_diagonal).collect();
     let skew = [0, 1, 2].map(|axis| unit(axis).cross_matrix());
     let single = [0, 1, 2].map(|axis| Matrix3::from_diagonal(&unit(axis)));
-    let all = Judged::of::<4>(segments, &near, &[Matrix3::identity()], None);
-    let turned = Judged::of::<6>(segments, &turn, &skew, Some(nearest_rotation));
-    let single = Judged::of::<6>(segments, &axes, &single, None);
-    let best = [all, turned, single].map(|judged| {
+    let turned =
+        |of: &[&Segment], starts: &[_]| Judged::of::<6>(of, starts, &skew, Some(nearest_rotation));
+    let single = |of: &[&Segment], starts: &[_]| Judged::of::<6>(of, starts, &single, None);
+    // First by a few: where the body only accelerates no map makes gravity stand still, and all are not tried by all.
+    let few: Vec<&Segment> = begun_by(segments).collect();
+    let of_few: Vec<f64> = begun_by(recorded).collect();
+    let begun = [turned(&few, &turn), single(&few, &axes)];
+    let is_hopeful = |judged: &Judged| {
+        let told = judged.against(&of_few);
+        told.is_some_and(|told| told.found <= HOPEFUL * LARGEST_FOUND)
+    };
+    if !begun.iter().flatten().any(is_hopeful) {
+        return None;
+    }
+    let [of_turn, of_axes] = begun.map(|judged| judged.map(|judged| judged.map));
+    let best = [
+        Judged::of::<4>(segments, &near, &[Matrix3::identity()], None),
+        of_turn.and_then(|start| turned(segments, &[start])),
+        of_axes.and_then(|start| single(segments, &[start])),
+    ];
+    let best = best.map(|judged| {
         let judged = judged?;
         let told = judged.against(recorded)?;
         Some((judged, told))
@@ -255,6 +275,12 @@ fn refined(segments: &[&Segment], recorded: &[f64]) -> Option<Finer> {
         found: told.found,
         segments: told.segments,
     })
+}
+
+/// About so many of all as a beginning takes.
+fn begun_by<T: Copy>(all: &[T]) -> impl Iterator<Item = T> {
+    let every = all.len().div_ceil(BEGUN_BY).max(1);
+    all.iter().step_by(every).copied()
 }
 
 /// Whether gravity that turns less than the body tells of the gyro: little less, or clearly.
@@ -297,8 +323,7 @@ impl Judged {
                 let found = segment.scatter::<3>(map, &[], &Vector3::zeros());
                 (found.s + FLOOR).ln()
             };
-            let every = segments.len().div_ceil(BEGUN_BY).max(1);
-            segments.iter().step_by(every).map(scatter).sum()
+            begun_by(segments).map(|segment| scatter(&segment)).sum()
         };
         let by_total =
             |some: &(f64, Matrix3<f64>), other: &(f64, Matrix3<f64>)| some.0.total_cmp(&other.0);

@@ -5,8 +5,9 @@
 use super::segment::{Scatter, Segment};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Steps of Gauss and Newton.
+/// Most steps of Gauss and Newton, and the length, in prior sigmas, of one that is the last.
 const STEPS: usize = 4;
+const SHORT: f64 = 1e-4;
 /// Longest step of a parameter.
 const LONGEST: f64 = 0.5;
 /// Prior sigma of a parameter, and weight of the priors.
@@ -52,6 +53,10 @@ pub(super) fn refine<'a, const P: usize>(
         x += step;
         for (direction, p) in directions.iter().zip(step.iter().skip(3)) {
             map += direction * *p;
+        }
+        let squares = step.component_mul(&step).component_mul(&prior.diagonal());
+        if squares.max() < PRIOR_WEIGHT * SHORT * SHORT {
+            break;
         }
     }
     let all = scatters(segments, &map, &directions, &x);

@@ -149,35 +149,37 @@ impl Segment {
         bias: &Vector3<f64>,
     ) -> Scatter<P> {
         let mut attitude = Quaternion::identity();
-        let mut turned_by: SMatrix<f64, 3, P> = SMatrix::zeros();
+        // Columns one by one: of matrices of any width the compiler makes loops.
+        let mut turned_by = [Vector3::zeros(); P];
         let mut force = [Vector3::zeros(); WINDOWS];
         let mut lever = [Matrix3::zeros(); WINDOWS];
-        let mut slope = [SMatrix::<f64, 3, P>::zeros(); WINDOWS];
+        let mut slope = [[Vector3::zeros(); P]; WINDOWS];
         for piece in &self.pieces {
             let angle = piece.angle + bias * piece.secs;
             let half = half_turn(&(map * angle));
             attitude *= half;
             let c = matrix(&attitude);
             let f = c * piece.force;
-            let mut step: SMatrix<f64, 3, P> = SMatrix::zeros();
-            step.fixed_columns_mut::<3>(0).copy_from(&(c * piece.secs));
-            for (i, direction) in directions.iter().enumerate() {
-                step.set_column(3 + i, &(c * (direction * angle)));
+            let mut crossed = [Vector3::zeros(); P];
+            for (i, (turned, crossed)) in turned_by.iter_mut().zip(&mut crossed).enumerate() {
+                let step = match i.checked_sub(3) {
+                    None => c.column(i) * piece.secs,
+                    Some(i) => c * (directions[i] * angle),
+                };
+                *crossed = (*turned + step * 0.5).cross(&f);
+                *turned += step;
             }
-            let middle = turned_by + step * 0.5;
-            turned_by += step;
-            let mut crossed = middle;
-            crossed.column_iter_mut().for_each(|mut column| {
-                let product = column.cross(&f);
-                column.copy_from(&product);
-            });
             for k in (0..WINDOWS).filter(|k| piece.weight[*k] != 0.0) {
-                force[k] += f * piece.weight[k];
+                let weight = piece.weight[k];
+                force[k] += f * weight;
                 lever[k] += c * piece.curvature[k];
-                slope[k] += crossed * piece.weight[k];
+                for (slope, crossed) in slope[k].iter_mut().zip(&crossed) {
+                    *slope += crossed * weight;
+                }
             }
             attitude *= half;
         }
+        let slope = slope.map(|columns| SMatrix::from_columns(&columns));
         without_lever_arm(force, lever, slope)
     }
 }
@@ -205,14 +207,25 @@ fn weigh(pieces: &mut [Piece], middles: &[f64], k: usize) {
     }
 }
 
+/// Square of a quarter of a turn up to which a series has all digits: 16 rad/s in a block.
+const SHORT: f64 = 0.0064;
+
 /// Rotation by half of the vector.
 fn half_turn(angle: &Vector3<f64>) -> Quaternion<f64> {
-    let quarter = angle.norm() / 4.0;
-    let by = match quarter > 1e-4 {
-        true => quarter.sin() / quarter,
-        false => 1.0 - quarter * quarter / 6.0,
+    let quarter = angle / 4.0;
+    let square = quarter.norm_squared();
+    let (cos, by) = if square <= SHORT {
+        (
+            1.0 - square / 2.0
+                * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0))),
+            1.0 - square / 6.0
+                * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))),
+        )
+    } else {
+        let length = square.sqrt();
+        (length.cos(), length.sin() / length)
     };
-    Quaternion::from_parts(quarter.cos(), angle * (by / 4.0))
+    Quaternion::from_parts(cos, quarter * by)
 }
 
 fn matrix(q: &Quaternion<f64>) -> Matrix3<f64> {
