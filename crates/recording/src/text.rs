@@ -68,3 +68,30 @@ pub fn named_few<T: AsRef<str>>(topics: &[T]) -> String {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_snippet_is_whole_escaped_characters_of_the_beginning() {
+        assert_eq!(snippet(b"1,2,3"), "1,2,3");
+        assert_eq!(snippet(b"a\x1b[2J"), "a\\u{1b}[2J");
+        assert_eq!(snippet(&[b'x'; 200]).len(), MAX_NEAR);
+        // An escape that has no place any more is left out whole.
+        let tail = [&[b'x'; 60][..], b"\x07\x07"].concat();
+        assert_eq!(snippet(&tail), "x".repeat(60));
+        assert_eq!(snippet("\u{202e}é".as_bytes()), "\\u{202e}é");
+        // A character that the cut divides is a mark of its own, for which there is no place.
+        let divided = [&[b'x'; 63][..], "é".as_bytes()].concat();
+        assert_eq!(snippet(&divided), "x".repeat(63));
+        assert_eq!(printable(&"\n".repeat(100)), "\\u{a}".repeat(51));
+    }
+
+    #[test]
+    fn what_is_refused_takes_one_piece_of_memory() {
+        // Half a million rows of a file of 11 kB are refused: of letters in strings of their own each took 3 us.
+        let refused = snippet(&[b','; 40]);
+        assert_eq!(refused.capacity(), refused.len());
+    }
+}
