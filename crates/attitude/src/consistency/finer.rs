@@ -30,9 +30,11 @@ const LEAST_SOON: f64 = 3.0;
 /// Factors of each axis and turns (rad) about single ones from which a refinement starts.
 const FACTORS: [f64; 3] = [1.0, 0.5, 2.0];
 const TURNS: [f64; 2] = [-0.8, 0.8];
-/// Largest scatter that a few segments may have under their best map, by the largest of a map that is found: what only
-/// accelerates has more.
-const HOPEFUL: f64 = 2.0;
+/// Largest scatter that a few segments may have under their best map, by the largest of a map that is found, and their
+/// least evidence and share: what only accelerates has more, and less.
+const HOPEFUL: f64 = 1.3;
+const HOPEFUL_EVIDENCE: f64 = 1.0;
+const HOPEFUL_SHARE: f64 = 0.5;
 /// Rounds of refinement of a turn: directions are straight, and a turn is not.
 const ROUNDS: usize = 3;
 /// Evidence of a segment that tells something about a refined map, and how many such there must be.
@@ -228,7 +230,11 @@ fn refined(segments: &[&Segment], recorded: &[f64]) -> Option<Finer> {
     let begun = [turned(&few, &turn), single(&few, &axes)];
     let is_hopeful = |judged: &Judged| {
         let told = judged.against(&of_few);
-        told.is_some_and(|told| told.found <= HOPEFUL * LARGEST_FOUND)
+        told.is_some_and(|told| {
+            told.found <= HOPEFUL * LARGEST_FOUND.min(LARGEST_RATIO * told.recorded)
+                && told.evidence >= HOPEFUL_EVIDENCE
+                && told.share >= HOPEFUL_SHARE
+        })
     };
     if !begun.iter().flatten().any(is_hopeful) {
         return None;
