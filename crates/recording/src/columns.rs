@@ -16,4 +16,4 @@ pub(crate) use given::{Given, Role};
 pub(crate) use names::{Kind, Meant, Name, words};
 pub use rows::RowFilter;
 pub(crate) use rows::RowSelection;
-pub(crate) use units::{Quantity, Unit};
+pub(crate) use units::{DAY, Quantity, Unit};

@@ -84,7 +84,10 @@ const FIELDS: [(&str, f64); 12] = [
     ("localflux", 1e-4),
 ];
 
-const TIMES: [(&str, f64); 25] = [
+/// Nanoseconds of a day.
+pub(crate) const DAY: f64 = 8.64e13;
+
+const TIMES: [(&str, f64); 26] = [
     ("ns", 1.0),
     ("nsec", 1.0),
     ("nsecs", 1.0),
@@ -111,6 +114,7 @@ const TIMES: [(&str, f64); 25] = [
     // A tick of Xsens.
     ("100us", 1e5),
     ("unixtime", 1e9),
+    ("days", DAY),
 ];
 
 /// A unit's text without what writers differ in: case, blanks, brackets, signs of powers and products.

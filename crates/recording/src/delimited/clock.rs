@@ -17,6 +17,8 @@ pub(super) enum Clock {
     Nanos,
     /// A column of numbers, so many nanoseconds each.
     Counts { nanos: f64, wraps: Option<Wraps> },
+    /// A column of days and their parts since so many days before 1970.
+    Days { origin: i64 },
     /// A column of dates (RFC 3339).
     Dates,
     /// A column of times of day.
@@ -61,7 +63,20 @@ impl Wraps {
     }
 }
 
+/// Days from the beginning of a spreadsheet's count (1899-12-30), and of MATLAB's (year 0), to 1970.
+const ORIGINS: [i64; 2] = [25_569, 719_529];
+/// Days from 1970 to 2000 and to 2100.
+const OUR_TIME: std::ops::Range<i64> = 10_957..47_482;
+
 impl Clock {
+    /// Clock of a column of days, by its first number: a date of our time by one of the two counts there are, else days
+    /// since some beginning.
+    pub(super) fn of_days(first: f64) -> Clock {
+        Clock::Days {
+            origin: origin_of(first).unwrap_or(0),
+        }
+    }
+
     /// The instant that a cell says; `number` has its point where it belongs.
     pub(super) fn read(&mut self, number: &str) -> Result<Nanos, &'static str> {
         let whole = || number.parse::<i64>().ok();
@@ -87,6 +102,7 @@ impl Clock {
                         .ok_or("is no number"),
                 }
             }
+            Clock::Days { origin } => days(number, *origin).ok_or("is no number of days"),
             Clock::Dates => instant_of_date(number).ok_or("is no date (RFC 3339)"),
             Clock::Daily(daily) => daily.read(number).ok_or("is no time of day"),
             Clock::Split { nanos } => whole()
@@ -167,6 +183,30 @@ fn at(count: i64, period: f64) -> Nanos {
 
 fn scaled(count: f64, nanos: f64) -> Nanos {
     Nanos((count * nanos).round() as i64)
+}
+
+/// Days before 1970 at which a count begins by which this is a date of our time.
+pub(super) fn origin_of(days: f64) -> Option<i64> {
+    let is_of_our_time = |origin: &i64| OUR_TIME.contains(&(days.floor() as i64 - origin));
+    ORIGINS.into_iter().find(is_of_our_time)
+}
+
+/// Instant of a decimal number of days.
+fn days(number: &str, origin: i64) -> Option<Nanos> {
+    const DAY: i64 = 86_400 * SECOND;
+    let (whole, part) = number.trim().split_once('.').unwrap_or((number.trim(), ""));
+    let whole: i64 = whole.parse().ok()?;
+    let part = match part {
+        "" => Nanos(0),
+        part => decimal_in_steps(&format!("0.{part}"), DAY)?,
+    };
+    let midnight = whole.checked_sub(origin)?.checked_mul(DAY)?;
+    let part = if number.trim().starts_with('-') {
+        -part.0
+    } else {
+        part.0
+    };
+    Some(Nanos(midnight.checked_add(part)?))
 }
 
 #[cfg(test)]

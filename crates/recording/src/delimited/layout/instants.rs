@@ -3,10 +3,11 @@
 //! The unit of a stamp is that of its name; else that in which the steps are those of a gyro; else, and that is said,
 //! that which its size suggests. Where name and steps contradict each other, neither is believed.
 
-use super::super::clock::{Clock, Wraps};
+use super::super::clock::{Clock, Wraps, origin_of};
 use super::super::time_of_day::{Daily, DateOrder, date_and_time, since_midnight};
 use super::is_number;
 use super::roles::{Roles, place};
+use crate::columns::DAY;
 use crate::columns::Meant;
 use crate::columns::Quantity;
 use crate::columns::Role;
@@ -258,9 +259,13 @@ impl Roles<'_> {
         let numbers = self.numbers(at);
         let stated = self.names.get(at).and_then(|name| name.unit.clone());
         let text = self.names.get(at).map_or("", |name| name.text.as_str());
+        let first = numbers.first().and_then(|n| n.parse().ok()).unwrap_or(0.0);
         let of = |nanos: f64| Stamp {
             at,
-            clock: Clock::Counts { nanos, wraps: None },
+            clock: match nanos == DAY {
+                true => Clock::of_days(first),
+                false => Clock::Counts { nanos, wraps: None },
+            },
             unit: Some(Unit::Time(nanos)),
             is_exact: nanos == 1.0 && numbers.iter().all(|n| n.parse::<i64>().is_ok()),
             note: None,
@@ -319,9 +324,16 @@ impl Roles<'_> {
                 "the unit `{unit}` of its stamps is not known"
             ))
             .help(format!(
-                "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
+                "{COLUMNS} stamp={}:UNIT, with ns, us, ms, s or days",
                 self.reference(at)
             ))),
+            _ if is_of_days(first, &stamps) => Ok(Stamp {
+                note: Some(format!(
+                    "the stamps in `{text}` are taken for days as a spreadsheet or MATLAB counts them: {COLUMNS} stamp={}:s says otherwise",
+                    self.reference(at)
+                )),
+                ..of(DAY)
+            }),
             _ => {
                 let (nanos, note) = self.unit_by_size(at, text, &stamps)?;
                 Ok(Stamp { note, ..of(nanos) })
@@ -432,7 +444,7 @@ impl Roles<'_> {
         if fits.is_some_and(|(_, fits)| !fits.contains(&by_size)) {
             return Err(
                 Diagnostic::new(format!("`{text}`: {}", why.what())).help(format!(
-                    "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
+                    "{COLUMNS} stamp={}:UNIT, with ns, us, ms, s or days",
                     self.reference(at)
                 )),
             );
@@ -503,6 +515,14 @@ impl Roles<'_> {
             ))),
         }
     }
+}
+
+/// Whether numbers are dates in days: of our time, with steps that are those of a gyro in no other unit.
+fn is_of_days(first: f64, stamps: &[Bare]) -> bool {
+    let fits = units_that_fit(stamps.iter().copied());
+    let is_gyro =
+        |(step, fits): (f64, Vec<TimeUnit>)| fits.is_empty() && (2e4..2e9).contains(&(step * DAY));
+    origin_of(first).is_some() && fits.is_some_and(is_gyro)
 }
 
 /// Rounds what is whole but for its rounding: stamps are exact then.

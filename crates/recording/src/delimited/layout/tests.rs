@@ -63,6 +63,40 @@ fn a_column_called_as_a_unit_of_time_is_the_clock_where_there_is_no_other() {
 }
 
 #[test]
+fn days_of_a_spreadsheet_and_of_matlab_are_dates() {
+    // 2024-01-31 12:00, and 10 ms a row: 45,322.5 days since 1899-12-30, 739,282.5 since year 0.
+    const NOON: i64 = 1_706_702_400_000_000_000;
+    for days in [45_322, 739_282] {
+        let rows_of = (0..40u64).map(|n| {
+            let billionths = 500_000_000_000 + n * 115_741;
+            format!("{days}.{billionths:012},0.1,0.2,0.3\n")
+        });
+        let text = format!("time,gyro_x,gyro_y,gyro_z\n{}", rows_of.collect::<String>());
+        for columns in [None, Some("stamp=time:days")] {
+            let (rows, notes) = rows(&text, columns);
+            let stamp = |n: usize| rows[n].1.unwrap();
+            assert_eq!(stamp(0), NOON, "{days} {columns:?}");
+            assert!(
+                (stamp(39) - NOON - 390_000_000).abs() < 2_000,
+                "{}",
+                stamp(39)
+            );
+            assert_eq!(
+                notes.contains("a spreadsheet or MATLAB"),
+                columns.is_none(),
+                "{notes}"
+            );
+        }
+    }
+    // Seconds since a start are none, and days since a start have no date.
+    let (rows, _) = rows(
+        "time,gyro_x,gyro_y,gyro_z\n1.5,0,0,0\n1.6,0,0,0\n",
+        Some("stamp=time:days"),
+    );
+    assert_eq!(rows[1].1, Some(138_240_000_000_000));
+}
+
+#[test]
 fn a_column_that_names_the_sensor_keeps_bodies_apart() {
     let two = |n: usize| ["left", "right"][n % 2].to_owned();
     for head in ["device", "sensor", "imu_id", "MAC", "id", "Device ID"] {
