@@ -256,6 +256,11 @@ fn table(rows: i64, codec: i64, head: Thrift, body: &[u8]) -> Vec<u8> {
 
 /// The same of several groups of rows, each with its page.
 fn table_of_groups(rows: i64, codec: i64, pages: &[Vec<u8>]) -> Vec<u8> {
+    table_that_states(&vec![rows; pages.len()], rows, codec, pages)
+}
+
+/// The same of groups that state so many rows each, and of columns that state `rows`.
+fn table_that_states(of_groups: &[i64], rows: i64, codec: i64, pages: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = b"PAR1".to_vec();
     let mut schema = vec![new().text(4, "schema").number(1, 4)];
     let names = ["stamp_ns", "gyro_x", "gyro_y", "gyro_z"];
@@ -264,7 +269,7 @@ fn table_of_groups(rows: i64, codec: i64, pages: &[Vec<u8>]) -> Vec<u8> {
         schema.push(new().number(1, kind).number(2, 0).text(1, name));
     }
     let mut groups = Vec::new();
-    for page in pages {
+    for (page, stated) in pages.iter().zip(of_groups) {
         let about = || {
             new()
                 .number(4, codec)
@@ -273,7 +278,7 @@ fn table_of_groups(rows: i64, codec: i64, pages: &[Vec<u8>]) -> Vec<u8> {
                 .number(2, bytes.len() as i64)
         };
         let chunks = names.map(|_| new().inside(3, about())).into();
-        groups.push(new().list(1, chunks).number(2, rows));
+        groups.push(new().list(1, chunks).number(2, *stated));
         bytes.extend(page);
     }
     let all = rows.saturating_mul(pages.len() as i64);
@@ -336,6 +341,32 @@ fn a_damaged_group_of_rows_costs_its_own_rows_whichever_it_is() {
     std::fs::write(at.join("d.parquet"), table_of_groups(100, 0, &pages)).unwrap();
     let words = ["none of its first rows could be read", "header is damaged"];
     strapd(at, "replay d.parquet -o null:").refused(1, &words);
+}
+
+#[test]
+fn rows_that_no_column_has_are_not_lost() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let group = |nth: i64| {
+        let stamps = (1..=100).flat_map(|n| ((nth * 100 + n) * 5_000_000).to_le_bytes());
+        [page(800, 800, 100, 0).0, vec![0], stamps.collect()].concat()
+    };
+    let pages: Vec<Vec<u8>> = (0..2).map(group).collect();
+    // One changed byte of the index made 16 million lost rows of sixty, and eight seconds of 260 kB.
+    for stated in [1 << 20, 101, 99] {
+        let bytes = table_that_states(&[100, stated], 100, 0, &pages);
+        std::fs::write(at.join("m.parquet"), bytes).unwrap();
+        let ran = strapd(at, "replay m.parquet -o null:");
+        assert_eq!(
+            (ran.code, lost(&ran)),
+            (Some(3), stated.min(100) as u64),
+            "{ran:?}"
+        );
+        assert!(
+            ran.out.contains("more or fewer values than rows"),
+            "{ran:?}"
+        );
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ pub fn printable(text: &str) -> String {
     escaped(text, 255)
 }
 
-/// As many whole characters of `text`, escaped, as go into `most` bytes.
+/// Beginning of `text`, escaped: the whole characters that go into `most` bytes.
 fn escaped(text: &str, most: usize) -> String {
     let mut out = String::with_capacity(text.len().min(most));
     for c in text.chars() {

@@ -104,7 +104,7 @@ pub enum Undecodable {
     },
     /// A row that was lost where it was stored.
     #[error("lost: {0}")]
-    Lost(String),
+    Lost(std::sync::Arc<str>),
     /// A line that binds no packed stream.
     #[error("{0}")]
     Unbound(Box<super::packed::Unbound>),

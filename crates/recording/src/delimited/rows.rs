@@ -14,6 +14,7 @@ use crate::text::without_mark;
 use crate::text::{printable, snippet};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::borrow::Cow;
+use std::sync::Arc;
 use strapd_attitude::frames::Sensor;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
@@ -88,9 +89,20 @@ pub struct Table {
     pub(super) given: Option<Columns>,
     /// Another table has begun, whose rows are none of this.
     is_elsewhere: bool,
+    /// Words for the row that was lost last, as they came and as they are shown: millions are lost for one reason.
+    lost: Option<(Vec<u8>, Arc<str>)>,
 }
 
 impl Table {
+    /// Reason why a row was lost, fit to be shown.
+    fn lost(&mut self, why: &[u8]) -> Arc<str> {
+        let known = self.lost.take().filter(|(before, _)| before == why);
+        let shown = || Arc::from(snippet(why.trim_ascii_end()));
+        let (before, shown) = known.unwrap_or_else(|| (why.to_vec(), shown()));
+        self.lost = Some((before, Arc::clone(&shown)));
+        shown
+    }
+
     /// Whether a line names the columns of a table of strapd's own.
     #[must_use]
     pub(crate) fn is_own_header(line: &[u8]) -> bool {
@@ -164,6 +176,7 @@ impl Table {
             assumed: String::new(),
             notes: Vec::new(),
             row: 0,
+            lost: None,
             selection: RowSelection::default(),
             given: None,
             is_elsewhere: false,
@@ -276,7 +289,7 @@ impl Table {
         }
         if let Some(why) = line.strip_prefix(LOST) {
             self.row += 1;
-            return Err(Undecodable::Lost(snippet(why.trim_ascii_end())));
+            return Err(Undecodable::Lost(self.lost(why)));
         }
         let row = self.delimiter.row(without_mark(line));
         if row.first() == self.header.first() && row == self.header {

@@ -68,6 +68,17 @@ pub(super) struct Group {
     pub(super) chunks: Vec<Chunk>,
 }
 
+impl Group {
+    /// Number of values that its columns state, the most of any: no more rows are there to be lost.
+    pub(super) fn stated_by_columns(&self) -> u64 {
+        self.chunks
+            .iter()
+            .map(|chunk| chunk.values)
+            .max()
+            .unwrap_or(0)
+    }
+}
+
 /// Contents of a footer.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct Footer {
