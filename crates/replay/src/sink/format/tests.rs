@@ -40,11 +40,14 @@ impl Form for Toy {
 fn a_format_of_which_the_table_has_a_row_is_listed_opened_by_its_ending_and_written() {
     assert!(Format::endings().ends_with(".parquet or .toy (children)"));
     assert!(Format::endings_for_samples().0.ends_with("or .toy"));
-    let said = Target::parse("a.bag").unwrap_err().to_string();
-    assert!(
-        said.contains("FILE.toy (or .toys; for children), s3://"),
-        "{said}"
-    );
+    for (name, listed) in [
+        ("a.bag", "FILE.toy (or .toys; for children)"),
+        ("a", "FILE.toy (or .toys; for children), s3://"),
+        ("a.toysx", "-o a.toys? files: "),
+    ] {
+        let said = Target::parse(name).unwrap_err().to_string();
+        assert!(said.contains(listed), "{said}");
+    }
 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.TOYS");
