@@ -82,7 +82,7 @@ def running(*arguments):
 
 @contextlib.contextmanager
 def browser():
-    with tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         flags = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-port=0"]
         child = subprocess.Popen(["chromium", *flags, f"--user-data-dir={profile}", "about:blank"], stderr=subprocess.PIPE, text=True)
         try:
