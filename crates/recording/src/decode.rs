@@ -48,7 +48,7 @@ pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
 pub(crate) use stamp::{
-    SHORTEST_STEP, bare as bare_of_text, days_since_1970, decimal_in_steps,
+    OUR_TIME, SHORTEST_STEP, bare as bare_of_text, days_since_1970, decimal_in_steps,
     from_rfc3339 as instant_of_date, units_of_steps, units_that_fit,
 };
 pub use stated::Stated;

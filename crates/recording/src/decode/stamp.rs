@@ -7,7 +7,9 @@
 mod unit;
 
 pub use unit::{Ambiguous, Bare, MOST_WAITING, unit_of};
-pub(crate) use unit::{SHORTEST_STEP, UnitEvidence, unit_in_log, units_of_steps, units_that_fit};
+pub(crate) use unit::{
+    OUR_TIME, SHORTEST_STEP, UnitEvidence, unit_in_log, units_of_steps, units_that_fit,
+};
 
 use strapd_attitude::record::{Nanos, TimeUnit};
 

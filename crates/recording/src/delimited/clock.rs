@@ -4,7 +4,8 @@
 //! dates, a running number beside a rate, nothing.
 
 use super::time_of_day::Daily;
-use crate::decode::{decimal_in_steps, instant_of_date};
+use crate::columns::DAY;
+use crate::decode::{OUR_TIME, decimal_in_steps, instant_of_date};
 use strapd_attitude::record::Nanos;
 
 /// Nanoseconds of a second.
@@ -65,8 +66,6 @@ impl Wraps {
 
 /// Days from the beginning of a spreadsheet's count (1899-12-30), and of MATLAB's (year 0), to 1970.
 const ORIGINS: [i64; 2] = [25_569, 719_529];
-/// Days from 1970 to 2000 and to 2100.
-const OUR_TIME: std::ops::Range<i64> = 10_957..47_482;
 
 impl Clock {
     /// Clock of a column of days, by its first number: a date of our time by one of the two counts there are, else days
@@ -187,21 +186,27 @@ fn scaled(count: f64, nanos: f64) -> Nanos {
 
 /// Days before 1970 at which a count begins by which this is a date of our time.
 pub(super) fn origin_of(days: f64) -> Option<i64> {
-    let is_of_our_time = |origin: &i64| OUR_TIME.contains(&(days.floor() as i64 - origin));
+    let (from, to) = (OUR_TIME.start as f64, OUR_TIME.end as f64);
+    let is_of_our_time = |origin: &i64| (from..to).contains(&((days - *origin as f64) * DAY));
     ORIGINS.into_iter().find(is_of_our_time)
 }
 
 /// Instant of a decimal number of days.
 fn days(number: &str, origin: i64) -> Option<Nanos> {
-    const DAY: i64 = 86_400 * SECOND;
-    let (whole, part) = number.trim().split_once('.').unwrap_or((number.trim(), ""));
+    let number = number.trim();
+    // As numpy.savetxt writes them.
+    if number.contains(['e', 'E']) {
+        let days: f64 = number.parse().ok().filter(|days: &f64| days.is_finite())?;
+        return Some(scaled(days - origin as f64, DAY));
+    }
+    let (whole, part) = number.split_once('.').unwrap_or((number, ""));
     let whole: i64 = whole.parse().ok()?;
     let part = match part {
         "" => Nanos(0),
-        part => decimal_in_steps(&format!("0.{part}"), DAY)?,
+        part => decimal_in_steps(&format!("0.{part}"), DAY as i64)?,
     };
-    let midnight = whole.checked_sub(origin)?.checked_mul(DAY)?;
-    let part = if number.trim().starts_with('-') {
+    let midnight = whole.checked_sub(origin)?.checked_mul(DAY as i64)?;
+    let part = if number.starts_with('-') {
         -part.0
     } else {
         part.0

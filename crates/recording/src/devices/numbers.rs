@@ -30,6 +30,13 @@ pub(super) fn f32_be(bytes: &[u8], at: usize) -> Option<[f64; 3]> {
     })
 }
 
+/// Four f32 in an order of bytes.
+pub(super) fn four(bytes: &[u8], at: usize, number: impl Fn([u8; 4]) -> f32) -> Option<[f64; 4]> {
+    let one = |at| array(bytes, at).map(|four| f64::from(number(four)));
+    let [b, c, d] = three(at + 4, 4, one)?;
+    Some([one(at)?, b, c, d])
+}
+
 /// Three i16, the least significant byte first.
 pub(super) fn i16_le(bytes: &[u8], at: usize) -> Option<[f64; 3]> {
     three(at, 2, |at| {

@@ -3,7 +3,6 @@
 //! Apart from the protocols because makers have two conventions among them, and a recording has one (REP-103). The
 //! heading of a device without a magnetometer begins anywhere: who compares aligns it.
 
-use super::numbers::{array, three};
 use crate::records::imu::nwu_of_ned;
 use std::f64::consts::FRAC_1_SQRT_2;
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
@@ -33,11 +32,4 @@ pub(super) fn of_nwu(q: &Quaternion<(), ()>) -> Orientation {
 pub(super) fn of_ned(q: &Quaternion<(), ()>) -> Orientation {
     let [x, y, z, w] = nwu_of_ned(q);
     of_nwu(&Quaternion::assume_unit([w, x, y, z]))
-}
-
-/// Four f32, read one by one.
-pub(super) fn four(bytes: &[u8], at: usize, number: impl Fn([u8; 4]) -> f32) -> Option<[f64; 4]> {
-    let one = |at| array(bytes, at).map(|four| f64::from(number(four)));
-    let [b, c, d] = three(at + 4, 4, one)?;
-    Some([one(at)?, b, c, d])
 }

@@ -37,10 +37,12 @@ pub(crate) struct Taken {
 
 impl Taken {
     /// Adds a sample, if its numbers are some.
-    pub(super) fn add(&mut self, sample: Sample) {
+    pub(super) fn add(&mut self, mut sample: Sample) {
+        // A device that has not settled sends its orientation as none, and its rates all the same.
+        let is_finite = |q: &[f64; 4]| q.iter().all(|number| number.is_finite());
+        sample.orientation = sample.orientation.filter(is_finite);
         let vectors = [sample.rate, sample.force, sample.field];
-        let orientation = sample.orientation.iter().flatten();
-        let mut numbers = vectors.iter().flatten().flatten().chain(orientation);
+        let mut numbers = vectors.iter().flatten().flatten();
         let is_some = sample.has_motion() || sample.orientation.is_some();
         if numbers.all(|number| number.is_finite()) && is_some {
             self.samples.push(sample);

@@ -13,8 +13,8 @@ use super::Device;
 use super::clock::mean_force;
 use super::frame::{Cut, may_begin};
 use super::motion::Choice;
-use super::numbers::{array, f32_le, scaled};
-use super::orientation::{Orientation, four, of_angles, of_ned, unit};
+use super::numbers::{array, f32_le, four, scaled};
+use super::orientation::{Orientation, of_angles, of_ned, unit};
 use super::sample::{Sample, Taken};
 use crate::records::imu::flu;
 use strapd_attitude::record::SampleKind;
@@ -251,7 +251,7 @@ fn text(frame: &[u8]) -> Option<Message> {
         "$VNIMU" => 0,
         _ => return None,
     };
-    let numbers: Vec<f64> = cells.map_while(|cell| cell.parse().ok()).collect();
+    let numbers: Vec<f64> = cells.map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
     let at = |n: usize| {
         numbers
             .get(skipped + n..)

@@ -1,8 +1,8 @@
 //! Frames of WitMotion's standard protocol -> a sample. Pure.
 //!
 //! A cycle consists of frames of eleven bytes, one for each quantity, in the order of their numbers: time, acceleration, rate,
-//! angles, field, quaternion. The rate makes the sample, with the acceleration and the time that came before it in the cycle; nothing
-//! waits for the next. Axes are those printed on the case, right-handed, z up: taken as they come.
+//! angles, field, quaternion. The rate makes the sample, with the acceleration and the time that came before it in the
+//! cycle; nothing waits for the next. Axes are those printed on the case, right-handed, z up: taken as they come.
 //!
 //! # Source
 //! WitMotion Standard Communication Protocol (WIT Standard): numbers of frames, ranges of 16 g and 2000 deg/s, sum. The

@@ -15,7 +15,8 @@ const STEPS: std::ops::RangeInclusive<i128> = SHORTEST_STEP as i128..=2_000_000_
 /// The shortest of them, ns.
 pub(crate) const SHORTEST_STEP: i64 = 20_000;
 /// 2000-01-01 to 2100-01-01, ns since 1970.
-const OUR_TIME: std::ops::Range<i128> = 946_684_800_000_000_000..4_102_444_800_000_000_000;
+pub(crate) const OUR_TIME: std::ops::Range<i128> =
+    946_684_800_000_000_000..4_102_444_800_000_000_000;
 
 const UNITS: [(TimeUnit, &str); 4] = [
     (TimeUnit::Nano, "ns"),

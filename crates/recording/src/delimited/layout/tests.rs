@@ -88,6 +88,11 @@ fn days_of_a_spreadsheet_and_of_matlab_are_dates() {
             );
         }
     }
+    // As numpy.savetxt writes them.
+    let text = "time,gyro_x,gyro_y,gyro_z\n4.53225e+04,0,0,0\n4.532250000011574e+04,0,0,0\n4.532250000023148e+04,0,0,0\n";
+    let (as_powers, _) = rows(text, None);
+    assert_eq!(as_powers[0].1, Some(NOON));
+    assert!((as_powers[2].1.unwrap() - NOON - 20_000_000).abs() < 2_000);
     // Seconds since a start are none, and days since a start have no date.
     let (rows, _) = rows(
         "time,gyro_x,gyro_y,gyro_z\n1.5,0,0,0\n1.6,0,0,0\n",

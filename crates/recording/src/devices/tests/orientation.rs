@@ -114,6 +114,16 @@ fn an_orientation_of_its_own_messages_is_a_topic_and_no_line() {
         link.push(&bytes, Nanos(0), None, &mut lines);
         assert!(lines.is_empty());
     }
+    // An orientation that is none costs no rate.
+    let items = [
+        (0x8020, made::numbers(0, &[1.0, 2.0, 3.0])),
+        (0x2010, made::numbers(0, &[f64::NAN; 4])),
+    ];
+    let (samples, _) = read("xsens", &made::xsens(&items, None, None));
+    assert_eq!(
+        (samples[0].rate, samples[0].orientation),
+        (Some([1.0, 2.0, 3.0]), None)
+    );
     // WitMotion: east-north-up; the first of its two forms is taken, and what has no time is left out.
     let time = made::witmotion(0x50, [24 | 5 << 8, 17 | 8 << 8, 0, 20]);
     let rate = made::witmotion(0x52, [0; 4]);
