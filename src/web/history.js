@@ -23,11 +23,15 @@ export class History extends Track {
     this.total = 0;
     this.compared = 0;
     this.acceleration = null;
+    // The ordinary time from one to the next: the shortest lately.
+    this.step = Infinity;
   }
 
   // Degrees, degrees a second, and m/s^2.
   push(time, { seq, q, rate, sigma, acceleration }, broken) {
     const slot = this.total % this.capacity;
+    const step = this.total ? time - this.timeOf(this.total - 1) : 0;
+    if (step > 0) this.step = Math.min(1.05 * this.step, step);
     this.time[slot] = time;
     this.seq[slot] = seq;
     this.q.set([q.w, q.x, q.y, q.z], 4 * slot);
@@ -79,7 +83,8 @@ export class History extends Track {
     return most;
   }
 
-  // Attitude at `time`, between its neighbours; null outside, and across a hole.
+  // Attitude at `time`, between its neighbours; null outside, and across a hole: what was dropped on the way to a slow
+  // page turned on meanwhile.
   attitudeAt(time) {
     const after = this.firstFrom(time);
     if (after >= this.total) return null;
@@ -87,7 +92,7 @@ export class History extends Track {
     if (late === time) return this.attitude(after);
     if (after === this.oldest || this.broken[this.slot(after)]) return null;
     const early = this.timeOf(after - 1);
-    if (late - early > 0.5) return null;
+    if (late - early > Math.min(0.5, 4 * this.step)) return null;
     return between(this.attitude(after - 1), this.attitude(after), (time - early) / (late - early));
   }
 }

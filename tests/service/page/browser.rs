@@ -8,12 +8,35 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tungstenite::{Message, WebSocket};
 
-/// One browser at a time: two share two cores badly.
-static TURN: Mutex<()> = Mutex::new(());
+/// Browsers at a time: each waits for half of its time, and more share two cores badly.
+const AT_ONCE: usize = 2;
+static RUNNING: Mutex<usize> = Mutex::new(0);
+static ENDED: Condvar = Condvar::new();
+
+/// Right to run a browser, as so many.
+struct Turn(usize);
+
+impl Turn {
+    fn wait(browsers: usize) -> Turn {
+        let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        while *running + browsers > AT_ONCE {
+            running = ENDED.wait(running).unwrap_or_else(PoisonError::into_inner);
+        }
+        *running += browsers;
+        Turn(browsers)
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        *RUNNING.lock().unwrap_or_else(PoisonError::into_inner) -= self.0;
+        ENDED.notify_all();
+    }
+}
 
 /// A browser with one page.
 pub(crate) struct Browser {
@@ -24,7 +47,7 @@ pub(crate) struct Browser {
     /// Events of the page, as the browser told: `method` and `params`.
     pub(crate) events: Vec<Value>,
     _profile: tempfile::TempDir,
-    _turn: MutexGuard<'static, ()>,
+    _turn: Turn,
 }
 
 /// The programme. A test that needs it is marked `#[cfg_attr(not(has_chromium), ignore = "needs
@@ -42,8 +65,16 @@ fn programme() -> String {
 impl Browser {
     /// Starts one with an empty page of 1280 x 1000 pixels. Without Chromium it fails.
     pub(crate) fn start() -> Browser {
+        Browser::with(Turn::wait(1))
+    }
+
+    /// The same while no other runs: for what is measured in frames or seconds.
+    pub(crate) fn start_alone() -> Browser {
+        Browser::with(Turn::wait(AT_ONCE))
+    }
+
+    fn with(turn: Turn) -> Browser {
         let programme = programme();
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
         let mut child = Command::new(programme)
             .args(["--headless", "--no-sandbox", "--disable-gpu"])

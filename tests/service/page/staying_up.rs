@@ -71,7 +71,7 @@ const COUNT: &str = r"new Promise((done) => {
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_sensor_at_8_khz_is_drawn_smoothly_in_bounded_memory() {
-    let mut browser = Browser::start();
+    let mut browser = Browser::start_alone();
     let daemon = Daemon::start(listening(&[TCP, WS]));
     browser.go(daemon.address(1), "/");
     browser.until_open();
@@ -150,7 +150,7 @@ fn a_sensor_at_8_khz_is_drawn_smoothly_in_bounded_memory() {
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn it_connects_again_soon_after_the_daemon_is_back() {
-    let mut browser = Browser::start();
+    let mut browser = Browser::start_alone();
     let mut daemon = Daemon::start(listening(&[WS, TCP]));
     let [web, tcp] = [0, 1].map(|n| daemon.address(n));
     browser.go(web, "/");
@@ -201,7 +201,7 @@ fn it_connects_again_soon_after_the_daemon_is_back() {
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn what_the_page_was_too_slow_for_is_said() {
-    let mut browser = Browser::start();
+    let mut browser = Browser::start_alone();
     let daemon = Daemon::start(listening(&[TCP, WS]));
     browser.go(daemon.address(1), "/?rate_hz=100000");
     browser.until_open();
