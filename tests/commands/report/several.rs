@@ -56,7 +56,7 @@ fn several_logs_stand_side_by_side_in_one_page() {
 #[test]
 fn a_page_about_a_hundred_logs_is_no_larger() {
     let dir = tempfile::tempdir().unwrap();
-    written(dir.path(), "a.mcap", &motion(2000));
+    written(dir.path(), "a.mcap", &motion(300));
     let names: Vec<String> = (0..100).map(|n| format!("n{n:03}.mcap")).collect();
     for name in &names {
         std::fs::copy(dir.path().join("a.mcap"), dir.path().join(name)).unwrap();

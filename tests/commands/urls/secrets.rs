@@ -62,6 +62,10 @@ fn a_signature_stands_in_nothing_that_is_printed_or_written() {
             "replay {} -o {stem}.csv --force --save-calibration {stem}.toml",
             "replay {} -o out/ --force --loop",
         ] {
+            // Who is busy is waited for, in one place for all commands.
+            if matches!(manner, Manner::Busy(_)) && !command.contains("-vv") {
+                continue;
+            }
             let ran = strapd(dir.path(), &command.replace("{}", &there), &[]);
             assert_hidden(&format!("{manner:?} {command}"), ran.err.as_bytes());
             assert_hidden(&format!("{manner:?} {command}"), ran.out.as_bytes());
