@@ -40,6 +40,7 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
                 status: Status::OK,
                 reset_count: 0,
                 log: Nanos(stamp.0 + 150_000),
+                temperature: None,
             }
         })
         .collect()

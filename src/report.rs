@@ -5,5 +5,5 @@ pub mod plot;
 
 pub use strapd_replay::findings;
 pub use strapd_replay::summary::{
-    self, against, aid, calendar, calibrating, calibration, series, smoothing, trace,
+    self, against, aid, calendar, calibrating, calibration, series, smoothing, trace, warming,
 };

@@ -35,6 +35,7 @@ pub fn at<'py>(
             status: Status(status & CUTS.0),
             reset_count: 0,
             log: stamp,
+            temperature: None,
         })
         .collect();
     let mut ordered: Vec<(usize, Nanos)> =

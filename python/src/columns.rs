@@ -25,6 +25,9 @@ pub struct Columns {
     /// Acceleration without gravity, body axes, m/s^2, and the upper triangle of its covariance, where the first attitude
     /// or a later one carries it; NaN of those that do not.
     pub linear_acceleration: Vec<f64>,
+    /// Temperature of the sensor, degrees Celsius, where the first attitude or a later one carries it; NaN of those that
+    /// do not.
+    pub temperature: Vec<f32>,
     /// Bits of the status.
     pub status: Vec<u16>,
     /// Resets and holds so far.
@@ -40,6 +43,7 @@ impl Columns {
             rate: Vec::with_capacity(3 * n),
             cov: (!noise.is_none()).then(|| Vec::with_capacity(6 * n)),
             linear_acceleration: Vec::new(),
+            temperature: Vec::new(),
             status: Vec::with_capacity(n),
             reset: Vec::with_capacity(n),
         }
@@ -68,6 +72,11 @@ impl Columns {
                 }
             }
         }
+        if all().any(|sample| sample.temperature.is_some()) {
+            self.temperature.resize(self.status.len(), f32::NAN);
+            let temperatures = all().map(|sample| sample.temperature.unwrap_or(f32::NAN));
+            self.temperature.extend(temperatures);
+        }
         self.status.extend(all().map(|sample| sample.status.0));
         self.reset.extend(all().map(|sample| sample.reset_count));
     }
@@ -85,6 +94,11 @@ impl Columns {
             let mut accelerations = self.linear_acceleration;
             accelerations.resize(NUMBERS * self.status.len(), f64::NAN);
             dict.set_item("linear_acceleration", rows(py, accelerations, NUMBERS)?)?;
+        }
+        if !self.temperature.is_empty() {
+            let mut temperature = self.temperature;
+            temperature.resize(self.status.len(), f32::NAN);
+            dict.set_item("temperature", temperature.into_pyarray(py))?;
         }
         dict.set_item("status", self.status.into_pyarray(py))?;
         dict.set_item("reset", self.reset.into_pyarray(py))?;

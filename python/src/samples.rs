@@ -114,6 +114,7 @@ pub fn sample(
         orientation: orientation.filter(|q| !q.iter().any(|x| x.is_nan())),
         orientation_resets: None,
         interval_nanos: dt.filter(|dt| *dt > 0),
+        temperature: None,
         is_beside: false,
     }
 }

@@ -21,7 +21,8 @@ pub struct Estimation {
     /// `all` = each of them
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
-    /// Path of a value in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt
+    /// Path of a value in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt,
+    /// temperature
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
     /// Topic of the specific force, where it comes in messages of its own

@@ -52,6 +52,7 @@ mod smoothing;
 mod stamp_units;
 mod streams;
 mod tables;
+mod temperatures;
 mod trajectory;
 mod transforms;
 mod urls;

@@ -49,6 +49,7 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
                 },
                 reset_count: (k / 1500) as u32,
                 log: Nanos(stamp.0 + 150_000),
+                temperature: None,
             }
         })
         .collect()
@@ -594,6 +595,7 @@ fn any_sample() -> impl Strategy<Value = AttitudeSample> {
             status: Status(status),
             reset_count,
             log: Nanos(log),
+            temperature: accel.map(|v| v.x as f32),
         },
     )
 }

@@ -46,6 +46,7 @@ fn attitude(raw: &RawSample) -> AttitudeSample {
         status: Status::OK,
         reset_count: 0,
         log: raw.log,
+        temperature: None,
     }
 }
 

@@ -42,6 +42,7 @@ mod settings_fingerprint;
 mod smoothing;
 mod smoothing_priors;
 mod stamps;
+mod temperatures;
 
 pub use aiding::{Aiding, Forces};
 pub use anew::RestartRequest;

@@ -130,6 +130,8 @@ pub struct RawSample {
     pub orientation_resets: Option<u8>,
     /// The message's own integration interval in nanoseconds (PX4 `gyro_integral_dt`, `delta_angle_dt`).
     pub interval_nanos: Option<i64>,
+    /// Temperature of the sensor, degrees Celsius, as its source states it: nothing is estimated by it.
+    pub temperature: Option<f32>,
     /// Whether it is of another sensor of the body than the gyro, with a stamp and a rate of its own: it corrects
     /// attitudes, and is no sample that lacks its rate.
     pub is_beside: bool,
@@ -350,6 +352,8 @@ pub struct AttitudeSample {
     pub reset_count: u32,
     /// Time at which the recorder received the sample this belongs to.
     pub log: Nanos,
+    /// Temperature of the sensor, degrees Celsius: the one received last by then.
+    pub temperature: Option<f32>,
 }
 
 /// Outcome of one sample. Exactly one verdict per sample.

@@ -53,6 +53,7 @@ pub struct Left {
 ///         status: Status::OK,
 ///         reset_count: 0,
 ///         log: Nanos(n * 100_000_000),
+///         temperature: None,
 ///     })
 ///     .collect();
 /// let mut frames = Vec::new();
@@ -230,6 +231,7 @@ impl Resampler {
             status: after.status,
             reset_count: after.reset_count,
             log: Nanos(before.log.0.saturating_add(log.round() as i64)),
+            temperature: before.temperature,
         }
     }
 }
@@ -275,6 +277,7 @@ mod tests {
             status: Status::OK,
             reset_count: 2,
             log: Nanos(ns + 7),
+            temperature: None,
         }
     }
 

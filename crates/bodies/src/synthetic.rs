@@ -407,6 +407,7 @@ impl Synthetic {
                     orientation: Some(spin.q_nb.wxyz()),
                     orientation_resets: None,
                     interval_nanos: (!rates).then_some((now - self.before) as i64),
+                    temperature: None,
                     is_beside: false,
                 });
                 self.noticed.samples += 1;

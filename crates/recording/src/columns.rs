@@ -8,6 +8,7 @@ mod given;
 mod increments;
 mod names;
 mod rows;
+mod temperatures;
 mod units;
 
 pub use cells::Delimiter;

@@ -94,15 +94,18 @@ pub enum Wanted {
     Forces,
     /// Magnetic fields, in messages of their own.
     Fields,
+    /// Temperatures, in messages of their own.
+    Temperatures,
 }
 
 impl Wanted {
-    /// Role and slots of the vector that is wanted.
-    fn vector(self) -> (FieldRole, Slot) {
+    /// Role and slots of the numbers that are wanted.
+    fn numbers(self) -> (FieldRole, Slot, u8) {
         match self {
-            Wanted::Rates => (FieldRole::Gyro, Slot::GYRO),
-            Wanted::Forces => (FieldRole::Accel, Slot::ACCEL),
-            Wanted::Fields => (FieldRole::Mag, Slot::MAG),
+            Wanted::Rates => (FieldRole::Gyro, Slot::GYRO, 3),
+            Wanted::Forces => (FieldRole::Accel, Slot::ACCEL, 3),
+            Wanted::Fields => (FieldRole::Mag, Slot::MAG, 3),
+            Wanted::Temperatures => (FieldRole::Temperature, Slot::TEMPERATURE, 1),
         }
     }
 }
@@ -593,6 +596,7 @@ fn state(type_name: &str, selection: &Selection, options: &Options) -> Stated {
     stated.has_gyro = selection.has(Slot::GYRO, 3);
     stated.has_accel = selection.has(Slot::ACCEL, 3);
     stated.has_mag = selection.has(Slot::MAG, 3);
+    stated.has_temperature = selection.has(Slot::TEMPERATURE, 1);
     stated.has_orientation = selection.has(Slot::ORIENTATION, 4);
     stated.has_stamp = selection.form.stamp != StampForm::None;
     stated.has_interval = selection.has(Slot::INTERVAL, 1);

@@ -18,6 +18,7 @@ pub mod smoothing;
 pub mod stamps;
 mod topic;
 pub mod trace;
+pub mod warming;
 
 pub use self::against::{Against, Recorded};
 pub use self::gaps::Gaps;

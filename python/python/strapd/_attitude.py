@@ -66,6 +66,7 @@ class Attitude:
         # None where no covariance is carried.
         self._cov: Optional[npt.NDArray[np.float64]] = columns.get("cov")
         self._acceleration: Optional[npt.NDArray[np.float64]] = columns.get("linear_acceleration")
+        self._temperature: Optional[npt.NDArray[np.float32]] = columns.get("temperature")
         self.status = columns["status"]
         self.reset = columns["reset"]
         self.summary = summary
@@ -114,6 +115,16 @@ class Attitude:
         w, xyz = self.q[:, :1], self.q[:, 1:]
         across = 2.0 * np.cross(xyz, self.linear_acceleration)
         return self.linear_acceleration + w * across + np.cross(xyz, across)
+
+    @property
+    def temperature(self) -> npt.NDArray[np.float32]:
+        """(n,): degrees Celsius, as the recording has it beside its samples; NaN where it has none.
+
+        ``summary["temperature"]`` holds the gyro's bias against it.
+        """
+        if self._temperature is None:
+            return np.full(len(self), np.nan, dtype=np.float32)
+        return self._temperature
 
     @property
     def _accelerations(self) -> npt.NDArray[np.float64]:
@@ -248,6 +259,8 @@ class Attitude:
         if self._acceleration is not None:
             for name in ("linear_acceleration", "world_linear_acceleration"):
                 columns.update({f"{name}_{axis}": getattr(self, name)[:, i] for i, axis in enumerate("xyz")})
+        if self._temperature is not None:
+            columns["temperature_c"] = self._temperature
         columns.update(status=self.status, reset=self.reset)
         return columns
 
@@ -320,6 +333,8 @@ class Attitude:
             columns["cov"] = self._cov[part]
         if self._acceleration is not None:
             columns["linear_acceleration"] = self._acceleration[part]
+        if self._temperature is not None:
+            columns["temperature"] = self._temperature[part]
         columns.update(status=self.status[part], reset=self.reset[part])
         return Attitude(columns, self.summary)
 

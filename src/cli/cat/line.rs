@@ -26,6 +26,11 @@ pub(in crate::cli) fn rate(id: &str, seq: u64, raw: &RawSample, kind: Option<Sam
         if let Some(interval) = raw.interval_nanos {
             put("dt_ns", json!(interval));
         }
+        // With its own digits: as the nearest double it would have more.
+        let digits = |temperature: f32| temperature.to_string().parse::<f64>().ok();
+        if let Some(temperature) = raw.temperature.and_then(digits) {
+            put("temperature_c", json!(temperature));
+        }
         if let Some(kind) = kind {
             put("sample_kind", json!(kind.name()));
         }

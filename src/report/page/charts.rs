@@ -4,6 +4,7 @@ use super::looking;
 use crate::report::plot::{Axis, Chart, Series, SeriesStyle};
 use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::trace::Traces;
+use crate::report::warming::Warming;
 use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::smooth::Sizes;
 
@@ -267,6 +268,49 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
         charts.push(over_time(time, title, "deg", lines));
     }
     charts
+}
+
+/// The bias against the temperature: what was learned, and the line through it; `None` where temperatures differ too
+/// little for one.
+pub(super) fn warming(warming: &Warming) -> Option<Result<String, String>> {
+    let fitted = warming.line()?;
+    let pairs = warming.pairs();
+    let ends = pairs.iter().map(|pair| pair.temperature);
+    let (coldest, warmest) = (
+        ends.clone().fold(f64::MAX, f64::min),
+        ends.fold(f64::MIN, f64::max),
+    );
+    let mut series = Vec::new();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let points = pairs
+            .iter()
+            .map(|pair| [pair.temperature, pair.bias[axis].to_degrees()]);
+        series.push(Series {
+            name: name.to_owned(),
+            look: SeriesStyle::Dots,
+            points: points.collect(),
+            color: Some(axis + 1),
+        });
+        let on_line = |temperature: f64| {
+            let bias = fitted.middle[axis] + fitted.slope[axis] * (temperature - fitted.at);
+            [temperature, bias.to_degrees()]
+        };
+        series.push(bound(
+            "",
+            vec![on_line(coldest), on_line(warmest)],
+            axis + 1,
+        ));
+    }
+    let chart = Chart {
+        title: "Bias against temperature, deg/s".to_owned(),
+        x: Axis::linear("temperature, degC"),
+        y: Axis::linear("deg/s"),
+        series,
+        size: SIZE,
+        beside: BESIDE,
+        ..Chart::default()
+    };
+    Some(chart.svg().map_err(|e| e.to_string()))
 }
 
 /// Part of an error.

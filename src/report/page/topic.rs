@@ -103,6 +103,12 @@ fn integrated(s: &TopicSummary, is_damaged: bool, stretches: Option<usize>, out:
         (Some(_), None) => out.push_str("<p>Not drawn, to keep this page small: <code>strapd report --topic NAME</code> draws it.</p>\n"),
         (None, _) => out.push_str("<p>No sample was used, so there is nothing to draw.</p>\n"),
     }
+    if stretches.is_some()
+        && let Some(chart) = charts::warming(&s.warming)
+    {
+        out.push_str(&figure("warming", chart));
+        out.push_str("<p class=\"small\">What was learned of the bias, once a second, at the temperature of the samples, and the line of least squares through it.</p>\n");
+    }
     let facts = facts(s, is_damaged, |key| !LOST.contains(&key) && key != AGAINST);
     out.push_str(&folded("how it was made, and how good it is", &facts));
     if let Some(smoothing) = s.smoothing() {

@@ -228,6 +228,7 @@ impl Saved {
             status: Status::OK,
             reset_count: self.reset,
             log: Nanos(self.stamp_ns),
+            temperature: None,
         })
     }
 }

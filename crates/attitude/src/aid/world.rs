@@ -98,6 +98,7 @@ mod tests {
             status: Status::OK,
             reset_count: 3,
             log: Nanos(0),
+            temperature: None,
         }
     }
 

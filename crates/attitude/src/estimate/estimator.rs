@@ -23,6 +23,7 @@ use super::sample_kind::{KindChoice, KindReason};
 use super::settings_fingerprint::settings_fingerprint;
 use super::smoothing::{Recording, Smoothing, SmoothingInputs};
 use super::smoothing_priors::looseness;
+use super::temperatures::Temperatures;
 use crate::aid::{self, AidedPropagator, OtherClass};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
@@ -68,6 +69,8 @@ pub struct Estimator {
     pub(super) before: Vec<AttitudeSample>,
     /// Attitudes up to this stamp have left as of another kind; until the first beyond it.
     pub(super) left_until: Option<Nanos>,
+    /// Temperatures of the samples, which change no attitude and are not remembered.
+    pub(super) temperatures: Temperatures,
 }
 
 /// Auxiliary inputs: what is taken beside the rates.
@@ -249,6 +252,7 @@ impl Estimator {
             open: None,
             before: Vec::new(),
             left_until: None,
+            temperatures: Temperatures::default(),
         })
     }
 
@@ -369,6 +373,7 @@ impl Estimator {
         if raw.is_beside {
             return self.take_beside(raw);
         }
+        self.temperatures.take(raw);
         if raw.mag.is_some() {
             self.take_field(raw);
         }
@@ -386,6 +391,7 @@ impl Estimator {
     /// rates, of their own. What is not asked for ([`EstimationSettings::aid`]), and a force where forces come with the rates
     /// ([`Forces`]), is passed over.
     pub fn take_beside(&mut self, raw: &RawSample) {
+        self.temperatures.take(raw);
         self.take_field(raw);
         let Some(besides) = &mut self.besides else {
             return;
@@ -442,6 +448,7 @@ impl Estimator {
             open.note_out(&self.out);
         }
         self.asked.apply(&mut self.out);
+        self.temperatures.apply(&mut self.out);
         &self.out
     }
 
@@ -514,11 +521,13 @@ impl Estimator {
             self.even.clear();
         }
         let asked = self.asked;
+        let mut temperatures = std::mem::take(&mut self.temperatures);
         let mut taken = Ok(());
         self.integrator
             .finish(exec, &mut self.out, &mut |attitudes| {
                 if taken.is_ok() {
                     asked.apply(attitudes);
+                    temperatures.apply(attitudes);
                     taken = take(attitudes);
                 }
             })?;
@@ -604,6 +613,12 @@ impl Estimator {
     #[must_use]
     pub fn sample_kind(&self) -> KindChoice {
         self.sample_kind
+    }
+
+    /// Temperature that was received last, degrees Celsius; `None` where samples carry none.
+    #[must_use]
+    pub fn temperature(&self) -> Option<f32> {
+        self.temperatures.last()
     }
 
     /// Report of conditioning.

@@ -128,6 +128,7 @@ impl Estimator {
         for event in &open.events {
             made.repeat(event);
         }
+        made.temperatures = self.temperatures.clone();
         made.left_until = open.last_out;
         made.make(&Sequential);
         made.before.splice(..0, self.before.iter().copied());

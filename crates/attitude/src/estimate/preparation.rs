@@ -81,6 +81,8 @@ pub struct Prepared {
     pub coarse: Option<CoarseClock>,
     /// Full scale of the gyro, rad/s, that was stated or that its samples were clipped at.
     pub gyro_range: Option<f64>,
+    /// Whether the first samples carry a temperature.
+    pub has_temperature: bool,
     /// Things to know.
     pub warnings: Vec<Diagnostic>,
 }
@@ -375,6 +377,7 @@ impl Preparation {
             stamps,
             has_arrival: true,
             is_class_open: class_pass::is_open(&plan),
+            has_temperature: first.iter().any(|raw| raw.temperature.is_some()),
             batches: clocks.batches,
             coarse: clocks.coarse,
             warnings,
@@ -477,6 +480,7 @@ pub fn at_once(
         sample_kind: resolved.kind_choice(),
         has_arrival: false,
         is_class_open: class_pass::is_open(plan),
+        has_temperature: together.iter().any(|raw| raw.temperature.is_some()),
         batches: None,
         coarse: None,
         noise: plan.noise.taken(),

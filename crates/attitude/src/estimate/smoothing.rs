@@ -446,6 +446,7 @@ impl Smoothing {
                     status,
                     reset_count: u32::try_from(section).unwrap_or(u32::MAX),
                     log: rate.log,
+                    temperature: None,
                 });
             }
             give(out);

@@ -12,9 +12,10 @@ pub(crate) enum Role {
     Step,
     Counter,
     Sensor,
+    Temperature,
 }
 
-const ROLES: [(&str, Role); 10] = [
+const ROLES: [(&str, Role); 11] = [
     ("gyro", Role::Of(Kind::Gyro)),
     ("accel", Role::Of(Kind::Accel)),
     ("mag", Role::Of(Kind::Mag)),
@@ -25,13 +26,14 @@ const ROLES: [(&str, Role); 10] = [
     ("dt", Role::Step),
     ("counter", Role::Counter),
     ("sensor", Role::Sensor),
+    ("temperature", Role::Temperature),
 ];
 
 impl Role {
     fn parts(self) -> usize {
         match self {
             Role::Of(kind) => kind.parts(),
-            Role::Stamp | Role::Step | Role::Counter | Role::Sensor => 1,
+            Role::Stamp | Role::Step | Role::Counter | Role::Sensor | Role::Temperature => 1,
         }
     }
 
@@ -39,6 +41,7 @@ impl Role {
         match self {
             Role::Of(kind) => kind.quantity(),
             Role::Stamp | Role::Step => Some(Quantity::Time),
+            Role::Temperature => Some(Quantity::Temperature),
             Role::Counter | Role::Sensor => None,
         }
     }
@@ -64,6 +67,7 @@ pub(crate) struct Given {
 /// dv=VelInc_X:VelInc_Y:VelInc_Z the velocity that belongs to it, m/s
 /// dt=step:ms                    the time since the row before, where there is no stamp
 /// counter=PacketCounter         a running number, beside a rate in the file's head
+/// temperature=temp:C            the sensor's temperature, and its unit (C, K, F)
 /// sensor=device                 the sensor of each row, where a table holds several
 /// accel=none                    not to be used
 /// ```

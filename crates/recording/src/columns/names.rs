@@ -4,6 +4,7 @@
 //! are there, shows in the whole header.
 
 use super::increments::{increment, step};
+use super::temperatures::temperature;
 use super::units::{Quantity, Unit};
 use crate::text::printable;
 
@@ -74,6 +75,8 @@ pub(crate) enum Meant {
     Step,
     /// A running number.
     Counter,
+    /// Temperature of the sensor, the closer to the gyro the lower.
+    Temperature(u8),
     /// Sensor of the row; where that is not clear, it may be another number as well.
     Sensor { is_clear: bool },
     /// Column of no use.
@@ -444,6 +447,9 @@ impl Name {
         }
         if let Some(is_clear) = names_sensor(&joined) {
             return (Meant::Sensor { is_clear }, None, None);
+        }
+        if let Some((rank, unit)) = temperature(all) {
+            return (Meant::Temperature(rank), Some(Quantity::Temperature), unit);
         }
         if let [mat, row, column] = all
             && mat == "mat"

@@ -17,6 +17,8 @@ pub(crate) enum Unit {
     Field(f64),
     /// Unit of a stamp: nanoseconds in one of it.
     Time(f64),
+    /// Unit of a temperature: degrees Celsius in one of it, and where it has its zero.
+    Temperature(f64, f64),
 }
 
 /// Quantity that is measured.
@@ -26,6 +28,7 @@ pub(crate) enum Quantity {
     Force,
     Field,
     Time,
+    Temperature,
 }
 
 /// Units of rates as [`plain`] leaves them.
@@ -117,6 +120,18 @@ const TIMES: [(&str, f64); 26] = [
     ("days", DAY),
 ];
 
+const TEMPERATURES: [(&str, f64, f64); 9] = [
+    ("c", 1.0, 0.0),
+    ("degc", 1.0, 0.0),
+    ("celsius", 1.0, 0.0),
+    ("degcelsius", 1.0, 0.0),
+    ("k", 1.0, -273.15),
+    ("kelvin", 1.0, -273.15),
+    ("f", 5.0 / 9.0, -160.0 / 9.0),
+    ("degf", 5.0 / 9.0, -160.0 / 9.0),
+    ("fahrenheit", 5.0 / 9.0, -160.0 / 9.0),
+];
+
 /// A unit's text without what writers differ in: case, blanks, brackets, signs of powers and products.
 pub(crate) fn plain(text: &str) -> String {
     let mut out = String::new();
@@ -167,6 +182,10 @@ impl Unit {
                 let found = TIMES.iter().find(|(name, _)| named(name));
                 found.map(|(_, nanos)| Unit::Time(*nanos))
             }
+            Quantity::Temperature => {
+                let found = TEMPERATURES.iter().find(|(name, ..)| named(name));
+                found.map(|(_, scale, zero)| Unit::Temperature(*scale, *zero))
+            }
         }
     }
 
@@ -176,6 +195,7 @@ impl Unit {
             Quantity::Force => Unit::Force(AccelUnit::MetresPerSecondSquared, 1.0),
             Quantity::Field => Unit::Field(1.0),
             Quantity::Time => Unit::Time(1e9),
+            Quantity::Temperature => Unit::Temperature(1.0, 0.0),
         }
     }
 
@@ -185,6 +205,7 @@ impl Unit {
             Unit::Force(unit, scale) => Unit::Force(unit, scale * factor),
             Unit::Field(scale) => Unit::Field(scale * factor),
             Unit::Time(nanos) => Unit::Time(nanos * factor),
+            Unit::Temperature(scale, zero) => Unit::Temperature(scale * factor, zero),
         }
     }
 
@@ -195,6 +216,13 @@ impl Unit {
             Unit::Force(unit, scale) => (Unit::Force(unit, 1.0), scale),
             Unit::Field(scale) => (Unit::Field(1.0), scale),
             Unit::Time(nanos) => (Unit::Time(1.0), nanos),
+            Unit::Temperature(scale, zero) => {
+                let mut known = TEMPERATURES.iter();
+                let base = known
+                    .find(|(_, _, of)| *of == zero)
+                    .map_or(1.0, |known| known.1);
+                (Unit::Temperature(base, zero), scale / base)
+            }
         };
         match self.name() {
             Some(name) => name.to_owned(),
@@ -224,6 +252,11 @@ impl Unit {
             Unit::Time(nanos) => {
                 let mut known = TIMES.iter();
                 known.find(|(_, by)| *by == nanos).map(|(name, _)| *name)
+            }
+            Unit::Temperature(scale, zero) => {
+                let mut known = TEMPERATURES.iter();
+                let found = known.find(|known| (known.1, known.2) == (scale, zero));
+                found.map(|(name, ..)| *name)
             }
         }
     }
@@ -270,6 +303,12 @@ mod tests {
                 "g*0.5",
             ),
             (Quantity::Time, "us*4", Unit::Time(4e3), "ns*4000"),
+            (
+                Quantity::Temperature,
+                "C*0.01",
+                Unit::Temperature(0.01, 0.0),
+                "c*0.01",
+            ),
         ] {
             let found = Unit::of(quantity, text);
             assert_eq!(found, Some(unit), "{text}");
@@ -288,10 +327,12 @@ mod tests {
             Quantity::Force,
             Quantity::Field,
             Quantity::Time,
+            Quantity::Temperature,
         ];
         let all = RATES.iter().map(|(name, ..)| *name);
         let all = all.chain(FORCES.iter().map(|(name, ..)| *name));
         let all = all.chain(FIELDS.iter().map(|(name, _)| *name));
+        let all = all.chain(TEMPERATURES.iter().map(|(name, ..)| *name));
         for text in all.chain(TIMES.iter().map(|(name, _)| *name)) {
             for quantity in quantities {
                 let Some(unit) = Unit::of(quantity, text) else {

@@ -38,9 +38,9 @@ pub(super) fn understand(
             format!("paths are names between dots: {FIELD} gyro=imu.angular_velocity"),
         )
     })?;
-    let (_, slot) = options.wanted.vector();
+    let (_, slot, numbers) = options.wanted.numbers();
     let is_reference = options.wanted == Wanted::Rates && selection.has(Slot::ORIENTATION, 4);
-    if selection.has(slot, 3) || is_reference {
+    if selection.has(slot, numbers) || is_reference {
         return Ok((schema, selection));
     }
     Err(nothing_wanted("type", options.wanted))
@@ -55,6 +55,7 @@ pub(super) fn nothing_wanted(what: &str, wanted: Wanted) -> (String, String) {
         ),
         Wanted::Forces => ("specific force", format!("name it: {FIELD} accel=PATH")),
         Wanted::Fields => ("magnetic field", format!("name it: {FIELD} mag=PATH")),
+        Wanted::Temperatures => ("temperature", format!("name it: {FIELD} temperature=PATH")),
     };
     let why = format!("the {what} has no {lacks} under a name this program knows");
     (why, help)

@@ -20,6 +20,8 @@ pub enum FieldRole {
     Stamp,
     /// The sample's own integration interval.
     Interval,
+    /// Temperature of the sensor, degrees Celsius.
+    Temperature,
 }
 
 impl FieldRole {
@@ -33,6 +35,7 @@ impl FieldRole {
             FieldRole::Orientation => "orientation",
             FieldRole::Stamp => "stamp",
             FieldRole::Interval => "dt",
+            FieldRole::Temperature => "temperature",
         }
     }
 
@@ -44,6 +47,7 @@ impl FieldRole {
             FieldRole::Orientation,
             FieldRole::Stamp,
             FieldRole::Interval,
+            FieldRole::Temperature,
         ]
         .into_iter()
         .find(|role| role.name() == name)
@@ -54,7 +58,7 @@ impl FieldRole {
         match self {
             FieldRole::Gyro | FieldRole::Accel | FieldRole::Mag => 3,
             FieldRole::Orientation => 4,
-            FieldRole::Stamp | FieldRole::Interval => 1,
+            FieldRole::Stamp | FieldRole::Interval | FieldRole::Temperature => 1,
         }
     }
 }
@@ -113,7 +117,7 @@ impl std::str::FromStr for FieldPath {
             bad("write it as role=path, for example gyro=imu.angular_velocity".to_owned())
         })?;
         let role = FieldRole::named(role.trim()).ok_or_else(|| {
-            bad("the roles are gyro, accel, mag, orientation, stamp, dt".to_owned())
+            bad("the roles are gyro, accel, mag, orientation, stamp, dt, temperature".to_owned())
         })?;
         let (list, unit) = match right.rsplit_once(':') {
             None => (right, None),

@@ -206,6 +206,7 @@ pub fn read(object: &[u8], received: Nanos) -> Result<Object, Unreadable> {
             orientation: None,
             orientation_resets: None,
             interval_nanos: u64_at(object, 72).and_then(|n| some_time(n.cast_signed())),
+            temperature: None,
             is_beside: false,
         };
         let seq = Some(seq).filter(|n| *n != NO_SEQ);

@@ -41,6 +41,8 @@ impl Slot {
     pub(crate) const STAMP_NANOS: Slot = Slot(21);
     /// Count of the orientation's resets.
     pub(crate) const RESETS: Slot = Slot(22);
+    /// Temperature of the sensor, degrees Celsius.
+    pub(crate) const TEMPERATURE: Slot = Slot(23);
 
     /// The slot `n` further on.
     pub(crate) fn plus(self, n: u8) -> Slot {
@@ -226,6 +228,9 @@ impl Form {
                     self.orientation(q, marked(Slot::ORIENTATION_MARK))
                 }),
             is_beside: false,
+            temperature: registers
+                .has(Slot::TEMPERATURE, 1)
+                .then(|| registers.get(Slot::TEMPERATURE) as f32),
             orientation_resets: registers
                 .has(Slot::RESETS, 1)
                 .then(|| (registers.get(Slot::RESETS) as i64) as u8),

@@ -163,12 +163,15 @@ fn take_given(
         FieldRole::Orientation => Slot::ORIENTATION,
         FieldRole::Stamp => return take_stamp(schema, field, &ends, selection, &nowhere),
         FieldRole::Interval => Slot::INTERVAL,
+        FieldRole::Temperature => Slot::TEMPERATURE,
     };
     let first = ends.first().ok_or_else(|| nowhere(&field.text))?.clone();
     let paths = if let [(path, end)] = ends.as_slice() {
         match field.role {
             FieldRole::Orientation => shapes::quaternion(schema, path, *end),
-            FieldRole::Interval => (end.number().is_some()).then(|| vec![path.clone()]),
+            FieldRole::Interval | FieldRole::Temperature => {
+                (end.number().is_some()).then(|| vec![path.clone()])
+            }
             _ => shapes::vector(schema, path, *end, 2),
         }
     } else {
@@ -176,7 +179,7 @@ fn take_given(
         all.then(|| ends.into_iter().map(|(path, _)| path).collect())
     };
     selection.take(paths.ok_or_else(|| nowhere(&field.text))?, slot);
-    if field.role == wanted.vector().0 {
+    if field.role == wanted.numbers().0 {
         selection.found = MatchQuality::Given;
     }
     if matches!(field.role, FieldRole::Gyro | FieldRole::Orientation) && selection.batch.is_none() {

@@ -149,7 +149,7 @@ impl Decoder {
         let stamped = if one.stamp.is_some() { one } else { &learnt };
         let unit = stamped.unlabelled().map(|bare| settled_unit(bare, log));
         let wanted = self.options.wanted;
-        let (_, slot) = wanted.vector();
+        let (_, slot, numbers) = wanted.numbers();
         let is_reference = wanted == Wanted::Rates && one.has_orientation();
         let has_stamp = stamped.stamp.is_some();
         let missing = self.options.fields.iter().find(|field| match field.role {
@@ -162,7 +162,7 @@ impl Decoder {
                 field.role.name(),
                 printable(&field.text)
             )),
-            None if !one.registers.has(slot, 3) && !is_reference => {
+            None if !one.registers.has(slot, u32::from(numbers)) && !is_reference => {
                 Some(nothing_wanted("message", wanted).0)
             }
             None => None,
@@ -171,6 +171,7 @@ impl Decoder {
         stated.has_gyro = one.has(FieldRole::Gyro);
         stated.has_accel = one.has(FieldRole::Accel);
         stated.has_mag = one.has(FieldRole::Mag);
+        stated.has_temperature = one.has(FieldRole::Temperature);
         stated.has_orientation = one.has(FieldRole::Orientation);
         stated.has_stamp = has_stamp;
         stated.has_interval = one.has(FieldRole::Interval);

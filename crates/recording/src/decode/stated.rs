@@ -19,6 +19,8 @@ pub struct Stated {
     pub has_accel: bool,
     /// Whether they carry a magnetic field.
     pub has_mag: bool,
+    /// Whether they carry a temperature.
+    pub has_temperature: bool,
     /// Whether they carry an orientation.
     pub has_orientation: bool,
     /// Whether they carry a stamp of their own.

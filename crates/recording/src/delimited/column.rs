@@ -18,6 +18,7 @@ pub(super) enum Column {
     Matrix(usize),
     /// Element of the rotation since the sample before.
     Turn(usize),
+    Temperature,
 }
 
 /// Whether a line is a comment.

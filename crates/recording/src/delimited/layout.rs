@@ -131,6 +131,7 @@ fn names_something(names: &[Name], given: Option<&Columns>, file: &File<'_>) -> 
     let kinds: &[Kind] = match file.wanted {
         Wanted::Rates => &[Kind::Gyro, Kind::Turn, Kind::Orientation, Kind::Matrix],
         Wanted::Forces | Wanted::Fields => &[Kind::Accel, Kind::Mag],
+        Wanted::Temperatures => &[],
     };
     are_there
         && (is_given
@@ -547,6 +548,7 @@ impl Name {
         match &self.meant {
             Meant::Part { kind, .. } => kind.quantity(),
             Meant::Stamp | Meant::Step => Some(Quantity::Time),
+            Meant::Temperature(_) => Some(Quantity::Temperature),
             Meant::Aside { .. }
             | Meant::Clock
             | Meant::Date

@@ -11,7 +11,7 @@ pub(crate) fn is_own_column(name: &str) -> bool {
 /// Columns that are read, by name. Those of a rate behind an attitude, and a quaternion's without their `q`, are in
 /// tables of attitudes. Units and axes are those of `strapd cat`: rad/s (delta angles in rad), m/s^2, x forward, y
 /// left, z up.
-pub(super) const COLUMNS: [(&str, Column); 26] = [
+pub(super) const COLUMNS: [(&str, Column); 27] = [
     ("stamp_ns", Column::Stamp),
     ("log_ns", Column::Log),
     // Of a synthetic gyro.
@@ -35,6 +35,7 @@ pub(super) const COLUMNS: [(&str, Column); 26] = [
     ("qx", Column::Orientation(1)),
     ("qy", Column::Orientation(2)),
     ("qz", Column::Orientation(3)),
+    ("temperature_c", Column::Temperature),
     // As they were called at first.
     ("w", Column::Orientation(0)),
     ("x", Column::Orientation(1)),

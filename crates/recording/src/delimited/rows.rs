@@ -38,6 +38,8 @@ pub(super) struct Scales {
     pub(super) gyro: f64,
     pub(super) accel: f64,
     pub(super) mag: f64,
+    /// Of a temperature: degrees Celsius in one of it, and its zero.
+    pub(super) temperature: [f64; 2],
 }
 
 impl Default for Scales {
@@ -46,6 +48,7 @@ impl Default for Scales {
             gyro: 1.0,
             accel: 1.0,
             mag: 1.0,
+            temperature: [1.0, 0.0],
         }
     }
 }
@@ -440,6 +443,10 @@ impl Table {
             orientation,
             orientation_resets: None,
             interval_nanos: read.interval.or(self.interval),
+            temperature: read.temperature.map(|value| {
+                let [scale, zero] = self.scales.temperature;
+                (value * scale + zero) as f32
+            }),
             is_beside: is_others && orientation.is_none(),
         });
         let mut line = Line {
@@ -538,6 +545,7 @@ struct Read {
     orientation: [Option<f64>; 4],
     turn: [Option<f64>; 4],
     matrix: [Option<f64>; 9],
+    temperature: Option<f64>,
 }
 
 impl Read {
@@ -567,7 +575,11 @@ impl Read {
         let text = std::str::from_utf8(cell).map_err(|_| "is not UTF-8")?;
         let whole = || text.parse::<i64>().map_err(|_| "is no whole number");
         if let Some(place) = self.place_of(column) {
-            *place = Some(number(text)?);
+            *place = match column {
+                // No sample is lost for want of one.
+                Column::Temperature => number(text).ok(),
+                _ => Some(number(text)?),
+            };
             return Ok(());
         }
         match column {
@@ -604,6 +616,7 @@ impl Read {
             Column::Orientation(part) => self.orientation.get_mut(part),
             Column::Turn(part) => self.turn.get_mut(part),
             Column::Matrix(part) => self.matrix.get_mut(part),
+            Column::Temperature => Some(&mut self.temperature),
             _ => None,
         }
     }

@@ -30,6 +30,8 @@ const GRAVITY: std::ops::Range<f64> = 5.0..15.0;
 #[derive(Debug, Default)]
 pub struct AuxiliaryInputs {
     channels: Vec<(Arc<Channel>, Decoder)>,
+    /// Whether temperatures are among them.
+    pub has_temperature: bool,
     /// Notes on what was taken unnamed.
     pub notes: Vec<String>,
 }
@@ -43,6 +45,7 @@ impl AuxiliaryInputs {
     }
 
     pub(super) fn append(&mut self, mut other: AuxiliaryInputs) {
+        self.has_temperature |= other.has_temperature;
         self.channels.append(&mut other.channels);
         self.notes.append(&mut other.notes);
     }
@@ -85,6 +88,8 @@ pub struct OwnMessages<'a> {
     pub has_force: bool,
     /// Whether they carry a magnetic field.
     pub has_field: bool,
+    /// Whether they carry a temperature.
+    pub has_temperature: bool,
 }
 
 /// Chooses what is read beside the samples of `own`; forces that nobody named are noted, not taken.
@@ -111,6 +116,12 @@ pub fn choose(
             "the magnetic field was taken from {} ({MAG_TOPIC} NAME takes another)",
             printable(&found.0.channel.topic)
         ));
+        besides.add(found);
+    }
+    if !own.has_temperature
+        && let Some(found) = temperature(plan, log, own.topic)
+    {
+        besides.has_temperature = true;
         besides.add(found);
     }
     Ok(besides)
@@ -344,6 +355,35 @@ fn one_beside<'f, 'l>(
         .help(format!("{MAG_TOPIC} NAME")),
     };
     Err(what)
+}
+
+/// The topic with the temperature of the sensor behind `own`: beside or below it, or called after an IMU. None where
+/// several may be meant: nothing is estimated by it.
+fn temperature<'l>(
+    plan: &EstimationSettings,
+    log: &'l Recording,
+    own: &str,
+) -> Option<Readable<'l>> {
+    let mut decoders = Decoders::of_run(plan, &options(Wanted::Temperatures, None));
+    let is_one = |known: &&LogChannel| {
+        let schema = known.channel.schema.as_deref().map_or("", |s| &s.name);
+        schema.rsplit(['/', '.']).next() == Some("Temperature")
+    };
+    let folder = own.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let is_near = |known: &&LogChannel| {
+        let topic = known.channel.topic.as_str();
+        let below = topic
+            .strip_prefix(folder)
+            .is_some_and(|rest| rest.starts_with('/'));
+        let name = topic.to_ascii_lowercase();
+        (below && !folder.is_empty()) || ["imu", "gyro"].iter().any(|word| name.contains(word))
+    };
+    let channels = log.channels.iter().filter(|known| known.messages > 0);
+    let mut found = channels.filter(is_one).filter(is_near);
+    match (found.next(), found.next()) {
+        (Some(one), None) => Some((one, one.decoder(&mut decoders).ok()?)),
+        _ => None,
+    }
 }
 
 /// Whether a topic's fields may be taken unnamed: a vector of no name may be anything.

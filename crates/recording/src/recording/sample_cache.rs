@@ -182,6 +182,7 @@ fn put(raw: &RawSample, out: &mut Vec<u8>) {
         orientation,
         orientation_resets,
         interval_nanos,
+        temperature,
         is_beside,
     } = raw;
     let has = [
@@ -195,6 +196,7 @@ fn put(raw: &RawSample, out: &mut Vec<u8>) {
         mag.is_some(),
         orientation.is_some(),
         *is_beside,
+        temperature.is_some(),
     ];
     let bits = has.iter().rev();
     let bits = bits.fold(0u16, |bits, has| (bits << 1) | u16::from(*has));
@@ -211,6 +213,9 @@ fn put(raw: &RawSample, out: &mut Vec<u8>) {
     out.extend(orientation_resets);
     let vectors = [gyro, accel, mag].into_iter().flatten().flatten();
     for value in vectors.chain(orientation.iter().flatten()) {
+        out.extend(value.to_bits().to_le_bytes());
+    }
+    if let Some(value) = temperature {
         out.extend(value.to_bits().to_le_bytes());
     }
 }
@@ -242,6 +247,10 @@ fn sample_of(from: &mut Bytes<'_>) -> Option<RawSample> {
         mag: numbers(flags.next()?, from)?,
         orientation: numbers(flags.next()?, from)?,
         is_beside: flags.next()?,
+        temperature: match flags.next()? {
+            true => Some(f32::from_bits(from.u32()?)),
+            false => None,
+        },
     })
 }
 
@@ -264,7 +273,7 @@ mod tests {
     /// Every set of values a sample can have, with numbers that only their bits tell apart.
     fn samples() -> Vec<RawSample> {
         let vector = |n: u16| [f64::from(n).sin(), -0.0, f64::NAN.copysign(-1.0)];
-        (0..1024u16)
+        (0..2048u16)
             .map(|n| {
                 let has = |bit: u16| n >> bit & 1 == 1;
                 let header = has(0).then_some(Nanos(i64::MIN + i64::from(n)));
@@ -283,6 +292,7 @@ mod tests {
                     orientation_resets: has(7).then_some(255),
                     interval_nanos: has(8).then_some(-1),
                     is_beside: has(9),
+                    temperature: has(10).then_some(-0.1),
                 }
             })
             .collect()
@@ -335,7 +345,7 @@ mod tests {
                 // As text, which has NaN equal and shows its sign and that of zero.
                 let (was, is) = (format!("{:?}", samples()), format!("{back:?}"));
                 assert!(was == is);
-                assert!(places.iter().copied().eq(0..342));
+                assert!(places.iter().copied().eq(0..683));
                 // Each in its place between the samples.
                 assert_eq!(bad.first(), Some(&(7, 8)));
                 assert_eq!(bad.len(), 7);

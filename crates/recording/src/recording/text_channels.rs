@@ -192,6 +192,7 @@ impl Met {
         for sample in samples {
             self.stated.has_accel |= sample.accel.is_some();
             self.stated.has_mag |= sample.mag.is_some();
+            self.stated.has_temperature |= sample.temperature.is_some();
         }
         for sample in samples.iter().filter(|raw| !raw.is_beside) {
             self.messages += 1;

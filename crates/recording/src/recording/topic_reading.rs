@@ -119,6 +119,8 @@ impl<'l> TopicReading<'l> {
             topic: &self.plan.source.topic,
             has_force: true,
             has_field: true,
+            // Of samples by themselves.
+            has_temperature: true,
         };
         let asked = (&EstimationSettings::default(), selection);
         let named = beside::choose(asked, self.log.name(), self.log, own)?;

@@ -133,11 +133,13 @@ pub(super) fn besides(
         topic: &one.plan.source.topic,
         has_force: stated().any(|stated| stated.has_accel),
         has_field: stated().any(|stated| stated.has_mag),
+        has_temperature: stated().any(|stated| stated.has_temperature),
     };
     let mut besides = beside::choose((&run.plan, &run.selection), path, log, own)?;
     one.found
         .warnings
         .extend(besides.notes.drain(..).map(Diagnostic::from));
+    one.stream.has_temperature = besides.has_temperature;
     Ok(besides)
 }
 

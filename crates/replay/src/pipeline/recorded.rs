@@ -170,6 +170,7 @@ impl RecordedTrack {
             status: Status::OK,
             reset_count: self.resets,
             log,
+            temperature: None,
         });
     }
 

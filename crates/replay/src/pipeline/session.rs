@@ -11,6 +11,8 @@ use super::unmet::{is_outside, unmet};
 use crate::error::{Error, Result};
 use crate::field_watch::FieldWatch;
 use crate::sink::{Flow, Target, Written};
+use crate::summary::warming::Warming;
+use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Histogram;
@@ -18,6 +20,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::estimate::{Meaning, Prepared};
+use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
@@ -61,6 +64,49 @@ pub(super) struct Topic {
     pub history: Option<History>,
     /// The recorded orientation, for who is shown it beside the estimate.
     pub recorded: Option<RecordedTrack>,
+    /// The bias against the temperature of its samples.
+    pub warming: WarmingWatch,
+}
+
+/// Time between two looks at the bias and its temperature, ns.
+const LOOK: i64 = 1_000_000_000;
+
+/// Looks at the bias and its temperature, a second apart.
+#[derive(Debug, Default)]
+pub(super) struct WarmingWatch {
+    /// The pairs.
+    pub pairs: Warming,
+    next: Option<Nanos>,
+    is_due: bool,
+}
+
+impl WarmingWatch {
+    /// Takes note of a temperature that was received. Whether it is time to look.
+    fn note(&mut self, raw: &RawSample) -> bool {
+        if raw.temperature.is_none() || self.next.is_some_and(|next| raw.log < next) {
+            return false;
+        }
+        self.next = Some(Nanos(raw.log.0.saturating_add(LOOK)));
+        self.is_due = true;
+        true
+    }
+
+    /// Looks, where it is time.
+    fn look(&mut self, estimator: &Estimator, removed: BodyRate) {
+        if !std::mem::take(&mut self.is_due) {
+            return;
+        }
+        let Some(temperature) = estimator.temperature() else {
+            return;
+        };
+        let learned = estimator.filter().filter(|filter| filter.is_started());
+        let (bias, sigma) = match learned {
+            Some(filter) => (filter.calibration().bias, filter.calibration_sigma().bias),
+            None => (Vector3::zeros(), Vector3::repeat(f64::INFINITY)),
+        };
+        self.pairs
+            .push(f64::from(temperature), removed.0 + bias, sigma);
+    }
 }
 
 /// Samples that are exactly zero about all axes between two that are not: what a driver without data says. A
@@ -178,6 +224,7 @@ impl Topic {
             against,
             history: None,
             recorded: None,
+            warming: WarmingWatch::default(),
         })
     }
 
@@ -276,24 +323,27 @@ impl Session {
         let several = self.topics.len() > 1 || self.outlet.has_audience();
         let take_turns = several && self.outlet.is_paced();
         for item in items {
-            self.take(item, pool)?;
-            if take_turns && self.advance(pool)? == Flow::Closed {
+            let is_due = self.take(item, pool)?;
+            if (take_turns || is_due) && self.advance(pool)? == Flow::Closed {
                 return Ok(Flow::Closed);
             }
         }
         self.advance(pool)
     }
 
-    fn take(&mut self, item: Item, pool: &Pool) -> Result<()> {
+    /// Takes an item. Whether it is time to look at what is known by it.
+    fn take(&mut self, item: Item, pool: &Pool) -> Result<bool> {
+        let mut is_due = false;
         match item {
             Item::Sample(stream, raw) => {
                 let Some(topic) = self.topics.get_mut(stream) else {
-                    return Ok(());
+                    return Ok(false);
                 };
                 topic.watch(&raw);
+                is_due = topic.warming.note(&raw);
                 if raw.is_beside {
                     topic.estimator.take(&raw);
-                    return Ok(());
+                    return Ok(is_due);
                 }
                 self.samples += 1;
                 topic.estimator.take(&raw);
@@ -311,7 +361,7 @@ impl Session {
             Item::Undecodable(stream, why) => {
                 self.samples += 1;
                 let Some(topic) = self.topics.get_mut(stream) else {
-                    return Ok(());
+                    return Ok(false);
                 };
                 topic.estimator.take_undecodable();
                 if let Some(history) = &mut topic.history {
@@ -330,12 +380,13 @@ impl Session {
             Item::Beside(raw) => {
                 for topic in &mut self.topics {
                     topic.watch(&raw);
+                    is_due |= topic.warming.note(&raw);
                     topic.estimator.take_beside(&raw);
                 }
             }
             Item::Copy(message) => self.outlet.copy(&message, pool)?,
         }
-        Ok(())
+        Ok(is_due)
     }
 
     /// Writes what is known by now.
@@ -357,6 +408,7 @@ impl Session {
             if let Some(recorded) = &mut topic.recorded {
                 recorded.show(stream, attitudes, &self.outlet);
             }
+            topic.warming.look(&topic.estimator, topic.prepared.bias);
             if is_more_known {
                 self.outlet.known(stream, &topic.estimator);
             }

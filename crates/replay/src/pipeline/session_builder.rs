@@ -28,6 +28,7 @@ pub fn labelled(
     stream.world_axes = world;
     stream.body_axes = body;
     stream.has_linear_acceleration = plan.linear_acceleration;
+    stream.has_temperature |= prepared.has_temperature;
     if resolved.is_remapped(plan, prepared.world) {
         stream.rotates = "body_to_world".to_owned();
         // The sensor's own frame keeps its axes; this is another one.

@@ -196,5 +196,6 @@ fn as_attitude(truth: &Truth) -> AttitudeSample {
         status: Status::OK,
         reset_count: 0,
         log: truth.stamp,
+        temperature: None,
     }
 }

@@ -80,6 +80,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             .unwrap_or_default(),
         recorded: topic.against.as_ref().and_then(AgainstRecorded::recorded),
         drawn,
+        warming: std::mem::take(&mut topic.warming.pairs),
         ..TopicSummary::of(of, &topic.estimator, topic.output.last.as_ref())
     };
     summary.findings.extend(topic.warnings.iter().map(warning));

@@ -5,7 +5,9 @@
 use super::axes::roll_pitch_yaw;
 use super::form::{Form, Opening, Slot};
 use super::stream::{Content, Stream};
-use super::text::{ACCELERATIONS, accelerations, push_f64, push_i64, push_status};
+use super::text::{
+    ACCELERATIONS, TEMPERATURE, accelerations, push_f64, push_i64, push_status, push_temperature,
+};
 use crate::error::Result;
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
@@ -22,9 +24,16 @@ pub const RAW_HEADER: &[u8] =
 const SYNTHETIC_HEADER: &[u8] =
     b"stamp_ns,true_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
 
-/// Rows, with what is in the last column of each, and whether the acceleration without gravity follows.
+/// Rows of attitudes or samples.
 #[derive(Debug)]
-struct Rows(String, bool);
+struct Rows {
+    /// What is in the last column of each.
+    last: String,
+    /// Whether the acceleration without gravity follows.
+    is_accelerated: bool,
+    /// Whether the temperature follows.
+    has_temperature: bool,
+}
 
 /// Begins a table of the one stream that has rows in it.
 pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn Form>> {
@@ -36,25 +45,29 @@ pub(super) fn begin(opening: &Opening<'_>, head: &mut Vec<u8>) -> Result<Box<dyn
         None => (HEADER, String::new()),
     };
     head.extend_from_slice(header);
-    let is_accelerated = stream.is_some_and(|s| s.has_linear_acceleration);
-    if is_accelerated {
-        head.pop();
-        for name in ACCELERATIONS {
-            head.push(b',');
-            head.extend_from_slice(name.as_bytes());
-        }
-        head.push(b'\n');
+    let rows = Rows {
+        last,
+        is_accelerated: stream.is_some_and(|s| s.has_linear_acceleration),
+        has_temperature: stream.is_some_and(|s| s.has_temperature),
+    };
+    head.pop();
+    let accelerations = ACCELERATIONS.iter().filter(|_| rows.is_accelerated);
+    let temperature = Some(&TEMPERATURE).filter(|_| rows.has_temperature);
+    for name in accelerations.chain(temperature) {
+        head.push(b',');
+        head.extend_from_slice(name.as_bytes());
     }
-    Ok(Box::new(Rows(last, is_accelerated)))
+    head.push(b'\n');
+    Ok(Box::new(rows))
 }
 
 impl Form for Rows {
     fn encode(&self, slot: &mut Slot) {
         for sample in &slot.batch.samples {
-            push_row(&mut slot.text, sample, (&self.0, self.1));
+            push_row(&mut slot.text, sample, self);
         }
         for sample in &slot.batch.raw {
-            push_raw_row(&mut slot.text, sample, &self.0);
+            push_raw_row(&mut slot.text, sample, &self.last);
         }
     }
 
@@ -84,8 +97,8 @@ pub fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample, kind: &str) {
     end_row(out, kind);
 }
 
-/// Appends one row with its line end. Several status names are joined by `|`; `world` is what it is relative to.
-fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, (world, is_accelerated): (&str, bool)) {
+/// Appends one row with its line end. Several status names are joined by `|`; the last column is what it is relative to.
+fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, rows: &Rows) {
     push_i64(out, sample.stamp.0);
     let q = sample.q_nb.wxyz();
     let [roll, pitch, yaw] = roll_pitch_yaw(q).map(f64::to_degrees);
@@ -101,14 +114,19 @@ fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, (world, is_accelerated):
     }
     out.push(b',');
     push_status(out, sample, b"", b"|");
-    end_row(out, world);
-    if is_accelerated {
-        out.pop();
+    out.push(b',');
+    out.extend_from_slice(rows.last.as_bytes());
+    if rows.is_accelerated {
         push_acceleration(out, sample);
     }
+    if rows.has_temperature {
+        out.push(b',');
+        push_temperature(out, sample.temperature);
+    }
+    out.push(b'\n');
 }
 
-/// Appends the acceleration without gravity to a row, and the line end.
+/// Appends the acceleration without gravity to a row.
 fn push_acceleration(out: &mut Vec<u8>, sample: &AttitudeSample) {
     let of = accelerations(sample);
     for place in 0..ACCELERATIONS.len() {
@@ -117,7 +135,6 @@ fn push_acceleration(out: &mut Vec<u8>, sample: &AttitudeSample) {
             push_number(out, numbers[place]);
         }
     }
-    out.push(b'\n');
 }
 
 fn end_row(out: &mut Vec<u8>, last: &str) {
@@ -198,7 +215,12 @@ mod tests {
         s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, f64::INFINITY, 0.0));
         s.status = Status::HELD.with(Status::SATURATED);
         let mut out = HEADER.to_vec();
-        push_row(&mut out, &s, ("enu", false));
+        let rows = Rows {
+            last: "enu".to_owned(),
+            is_accelerated: false,
+            has_temperature: false,
+        };
+        push_row(&mut out, &s, &rows);
         let mut reader = csv::Reader::from_reader(out.as_slice());
         assert_eq!(reader.headers().unwrap().len(), 16);
         let row = reader.records().next().unwrap().unwrap();

@@ -10,8 +10,8 @@ use super::form::{Form, Opening, Slot};
 use super::plot::PlotObject;
 use super::stream::{Content, Stream};
 use super::text::{
-    of_transform, parent_and_child, push_array3, push_f64, push_i64, push_stamp, push_status,
-    push_string, push_u64,
+    TEMPERATURE, of_transform, parent_and_child, push_array3, push_f64, push_i64, push_stamp,
+    push_status, push_string, push_temperature, push_u64,
 };
 use crate::error::Result;
 use strapd_attitude::record::{AttitudeSample, RawSample, SampleKind};
@@ -141,8 +141,19 @@ impl RateObject {
             out.extend_from_slice(b",\"dt_ns\":");
             push_i64(out, interval);
         }
+        push_temperature_key(out, sample.temperature);
         out.extend_from_slice(&self.kind);
         out.push(b'}');
+    }
+}
+
+/// Appends a temperature under its key, where there is one.
+fn push_temperature_key(out: &mut Vec<u8>, temperature: Option<f32>) {
+    if temperature.is_some_and(f32::is_finite) {
+        out.extend_from_slice(b",\"");
+        out.extend_from_slice(TEMPERATURE.as_bytes());
+        out.extend_from_slice(b"\":");
+        push_temperature(out, temperature);
     }
 }
 
@@ -207,6 +218,7 @@ impl AttObject {
                 push_array3(out, (*vector).into());
             }
         }
+        push_temperature_key(out, sample.temperature);
         out.push(b'}');
     }
 }

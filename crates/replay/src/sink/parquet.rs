@@ -10,7 +10,7 @@ mod column;
 use super::batch::Batch;
 use super::form::{Form, Opening, Precision, Slot};
 use super::stream::{Content, Provenance, Stream};
-use super::text::{ACCELERATIONS, accelerations};
+use super::text::{ACCELERATIONS, TEMPERATURE, accelerations};
 use column::{Clock, Column, Values};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::data_type::ByteArray;
@@ -138,6 +138,11 @@ impl Table {
                 11 => column.extend_whole(samples.iter().map(|s| i64::from(s.status.0))),
                 12 => column.extend_whole(samples.iter().map(|s| i64::from(s.reset_count))),
                 13 => column.extend_whole(samples.iter().map(|_| stream as i64)),
+                _ if column.name == TEMPERATURE => {
+                    for sample in samples {
+                        column.push(sample.temperature.map(f64::from));
+                    }
+                }
                 _ => {
                     for sample in samples {
                         column.push(accelerations(sample).map(|of| of[place - 14]));
@@ -252,6 +257,9 @@ fn attitude_columns(streams: &[Stream], precision: Precision) -> Vec<Column> {
         let (body_and_world, sigma) = ACCELERATIONS.split_at(6);
         columns.extend(numbers(body_and_world, precision).map(optional));
         columns.extend(numbers(sigma, Precision::Single).map(optional));
+    }
+    if streams.iter().any(|s| s.has_temperature) {
+        columns.push(Column::optional(TEMPERATURE, Values::Single(Vec::new())));
     }
     columns
 }

@@ -45,6 +45,8 @@ pub struct Stream {
     pub field_topic: Option<String>,
     /// Whether its attitudes carry the acceleration without gravity.
     pub has_linear_acceleration: bool,
+    /// Whether they carry the temperature of the sensor.
+    pub has_temperature: bool,
     /// The frame whose attitude this is: `header.frame_id` of the Imu, child of the transform.
     pub frame_id: String,
     /// The frame it is given in: parent of the transform.
@@ -71,6 +73,7 @@ impl Stream {
             output_topic: output_topic(input_topic, &BTreeSet::new()),
             field_topic: None,
             has_linear_acceleration: false,
+            has_temperature: false,
             frame_id: frame_id.to_owned(),
             world_frame: "world".to_owned(),
             transforms: Transforms::Forward,
@@ -96,6 +99,7 @@ impl Stream {
             output_topic: bounded(&self.output_topic),
             field_topic: self.field_topic.as_deref().map(bounded),
             has_linear_acceleration: self.has_linear_acceleration,
+            has_temperature: self.has_temperature,
             frame_id: bounded(&self.frame_id),
             world_frame: bounded(&self.world_frame),
             transforms: self.transforms,

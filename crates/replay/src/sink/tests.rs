@@ -17,5 +17,6 @@ pub(super) fn sample(stamp: Nanos) -> AttitudeSample {
         status: Status::OK,
         reset_count: 0,
         log: stamp,
+        temperature: None,
     }
 }

@@ -71,6 +71,16 @@ pub(super) fn push_status(
         }
     }
 }
+/// Column, and key of an object, of the sensor's temperature, degrees Celsius.
+pub(super) const TEMPERATURE: &str = "temperature_c";
+
+/// Appends a temperature; nothing where there is none.
+pub(super) fn push_temperature(out: &mut Vec<u8>, temperature: Option<f32>) {
+    if let Some(value) = temperature {
+        let _ = CompactFormatter.write_f32(out, value);
+    }
+}
+
 /// Columns of the acceleration without gravity, m/s^2, behind the others of a table whose attitudes carry it: along the
 /// body's axes, along the world's, one standard deviation along the body's.
 pub(super) const ACCELERATIONS: [&str; 9] = [

@@ -14,6 +14,7 @@ use super::series::Drawn;
 use super::sigma::SigmaTerms;
 use super::smoothing::Smoothing;
 use super::stamps::Regularised;
+use super::warming::Warming;
 use super::{meaning, significant};
 use crate::finding::{Finding, Severity};
 use serde_json::{Map, Value, json};
@@ -132,6 +133,8 @@ pub struct TopicSummary {
     pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
     pub findings: Vec<Finding>,
+    /// The bias against the temperature.
+    pub warming: Warming,
     /// Series to draw, if a report asked for them.
     pub drawn: Option<Box<Drawn>>,
 }
@@ -285,6 +288,8 @@ impl TopicSummary {
                 .told(corrector, corrected.into_iter().filter_map(seen)),
             Row::value("bias_rad_s", self.bias_json()).told("bias", seen(self.bias_text())),
             Row::value("bias_sigma_rad_s", self.bias_sigma.as_slice()),
+            Row::value("temperature", self.warming.json())
+                .told("warming", self.warming.text().and_then(seen)),
             Row::value("truncation_step_rad_s", self.truncation_step),
             Row::value("repaired_spikes", self.spikes),
             Row::value("forces_left_out", self.force_spikes),

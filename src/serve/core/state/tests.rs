@@ -19,6 +19,7 @@ fn sample() -> AttitudeSample {
         status: Status::OK,
         reset_count: 3,
         log: Nanos(1_700_000_000_123_456_789),
+        temperature: None,
     }
 }
 

@@ -89,6 +89,7 @@ mod tests {
                 status: Status::OK,
                 reset_count: 0,
                 log: Nanos(0),
+                temperature: None,
             };
             let now = attitude_now(Some(&filter), Some(&last));
             assert_eq!(now["aided"], "gravity");

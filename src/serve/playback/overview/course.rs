@@ -230,6 +230,7 @@ mod tests {
             status: Status::OK,
             reset_count: resets,
             log: Nanos(0),
+            temperature: None,
         }
     }
 

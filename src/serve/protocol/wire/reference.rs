@@ -76,6 +76,7 @@ pub(super) fn read(id: &str, line: &[u8]) -> Result<Reference, Fault> {
             status: Status::OK,
             reset_count: 0,
             log: Nanos(stamp),
+            temperature: None,
         },
     })
 }

@@ -275,6 +275,7 @@ impl Output {
             status: sample.status.with(self.state.added),
             reset_count: self.state.resets,
             log: sample.log,
+            temperature: None,
         });
         self.state.added = Status::OK;
         self.report.samples += 1;

@@ -72,7 +72,7 @@ fn what_only_sounds_like_a_measurement_is_none() {
         "x",
         "q0",
         "status",
-        "temperature",
+        "baro_temperature",
         "",
         "axisP[0]",
     ] {

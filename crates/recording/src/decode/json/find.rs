@@ -31,6 +31,7 @@ pub(crate) struct Seeker<'a, 'p> {
     auto_orientation: bool,
     auto_stamp: bool,
     auto_interval: bool,
+    auto_temperature: bool,
     /// Samples in arrays so far, wherever in the message.
     batched: usize,
     /// The strings and numbers of the outermost object that a line protocol needs.
@@ -54,6 +55,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             auto_orientation: auto(FieldRole::Orientation),
             auto_stamp: auto(FieldRole::Stamp),
             auto_interval: auto(FieldRole::Interval),
+            auto_temperature: auto(FieldRole::Temperature),
             batched: 0,
             class: None,
             id: None,
@@ -221,6 +223,9 @@ impl<'a, 'p> Seeker<'a, 'p> {
             Some(Meaning::OrientationResets) if self.auto_orientation => {
                 self.number(Slot::RESETS, found)?;
             }
+            Some(Meaning::Temperature) if self.auto_temperature => {
+                self.number(Slot::TEMPERATURE, found)?
+            }
             _ => self.other(key, depth, found)?,
         }
         Ok(())
@@ -237,6 +242,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 Wanted::Rates => gyro,
                 Wanted::Forces => Some(Meaning::Accel { rank: 5 }),
                 Wanted::Fields => Some(Meaning::Mag),
+                Wanted::Temperatures => None,
             },
             "xyz" if self.plan.px4 == Some(Px4::VehicleAngularVelocity) => gyro,
             _ => meaning(key),

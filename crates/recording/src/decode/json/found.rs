@@ -139,6 +139,7 @@ impl<'a> ObjectFields<'a> {
             FieldRole::Orientation => self.has_orientation(),
             FieldRole::Stamp => self.stamp.is_some(),
             FieldRole::Interval => self.registers.has(Slot::INTERVAL, 1),
+            FieldRole::Temperature => self.registers.has(Slot::TEMPERATURE, 1),
         }
     }
 
@@ -156,8 +157,12 @@ impl<'a> ObjectFields<'a> {
     }
 
     /// Keeps what an object inside this one held, until all keys have been seen.
-    pub(crate) fn nest(&mut self, inner: ObjectFields<'a>, rule: StampRule) {
+    pub(crate) fn nest(&mut self, mut inner: ObjectFields<'a>, rule: StampRule) {
         self.names_gyro |= inner.names_gyro;
+        // That of a battery is none of the sensor's.
+        if !inner.has_gyro() {
+            inner.registers.seen &= !Slot::TEMPERATURE.bits(1);
+        }
         if inner.registers.seen == 0 && inner.batch.is_empty() && inner.stamp.is_none() {
             return;
         }

@@ -41,11 +41,12 @@ impl Trie {
                 FieldRole::Mag => Slot::MAG,
                 FieldRole::Orientation => Slot::ORIENTATION,
                 FieldRole::Stamp | FieldRole::Interval => Slot::INTERVAL,
+                FieldRole::Temperature => Slot::TEMPERATURE,
             };
             for (n, path) in (0_u8..).zip(&field.paths) {
                 let target = match field.role {
                     FieldRole::Stamp => Target::Stamp(unit),
-                    FieldRole::Interval => Target::Number(base, unit),
+                    FieldRole::Interval | FieldRole::Temperature => Target::Number(base, unit),
                     role if field.paths.len() == 1 => Target::Whole(role),
                     _ => Target::Number(base.plus(n), unit),
                 };

@@ -18,6 +18,7 @@ fn sample(stamp: Nanos) -> AttitudeSample {
         status: Status::OK,
         reset_count: 0,
         log: stamp,
+        temperature: None,
     }
 }
 

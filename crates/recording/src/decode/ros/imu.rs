@@ -156,6 +156,7 @@ fn sample<const BIG: bool>(
         orientation: form.orientation([w, x, y, z], is_mark(double(imu::ORIENTATION_COVARIANCE))),
         orientation_resets: None,
         interval_nanos: None,
+        temperature: None,
         is_beside: false,
     })
 }

@@ -33,6 +33,8 @@ pub(crate) enum Meaning {
     Orientation { rank: u8 },
     /// Count of an orientation's resets.
     OrientationResets,
+    /// Temperature of the sensor, degrees Celsius.
+    Temperature,
     /// A stamp.
     Stamp { rank: u8, unit: TimeUnit },
     /// Something that holds a stamp.
@@ -128,6 +130,13 @@ fn accel_tail(tail: &str, rank: u8) -> Option<Meaning> {
     }
 }
 
+/// The temperature of a gyro; under another unit's name none is taken.
+fn temperature(name: &str) -> Option<Meaning> {
+    let tail = name.strip_prefix("temperature");
+    let tail = tail.or_else(|| name.strip_prefix("temp"))?;
+    matches!(tail, "" | "c" | "degc" | "celsius").then_some(Meaning::Temperature)
+}
+
 fn a_names(name: &str) -> Option<Meaning> {
     for (head, rank) in [
         ("angularvelocity", 0),
@@ -176,7 +185,7 @@ fn g_names(name: &str) -> Option<Meaning> {
     }
     for (head, rank) in [("gyroscope", 0), ("gyro", 0), ("gyr", 1)] {
         if let Some(tail) = name.strip_prefix(head) {
-            return gyro_tail(tail, rank);
+            return gyro_tail(tail, rank).or_else(|| temperature(tail));
         }
     }
     None
@@ -221,11 +230,10 @@ fn rare_names(name: &str) -> Option<Meaning> {
         "pitchspeed" => gyro_tail("y", 3),
         "yawspeed" => gyro_tail("z", 3),
         "ygyro" | "yacc" | "ymag" => axis_first(name),
-        _ => gyro_tail(
-            name.strip_prefix("omega")
-                .or_else(|| name.strip_prefix("imugyro"))?,
-            1,
-        ),
+        _ => match name.strip_prefix("imu") {
+            Some(tail) => temperature(tail).or_else(|| gyro_tail(tail.strip_prefix("gyro")?, 1)),
+            None => gyro_tail(name.strip_prefix("omega")?, 1),
+        },
     }
 }
 
@@ -252,6 +260,7 @@ fn time_names(name: &str) -> Option<Meaning> {
         "t" | "ts" => (3, ""),
         "sampletime" => (1, ""),
         "specificforce" => return Some(Meaning::Accel { rank: 0 }),
+        _ if name.starts_with("temp") => return temperature(name),
         _ => [("timestamp", 1), ("stamp", 1), ("time", 2), ("t", 3)]
             .into_iter()
             .find_map(|(head, rank)| Some((rank, name.strip_prefix(head)?)))?,
@@ -362,13 +371,17 @@ mod tests {
         assert_eq!(meaning("timestamp_us"), stamp(1, TimeUnit::Micro));
         assert_eq!(meaning("t_ns"), stamp(3, TimeUnit::Nano));
         assert_eq!(meaning("time"), stamp(2, TimeUnit::ByMagnitude));
+        for name in ["temperature", "temp_c", "gyro_temperature", "imu_temp"] {
+            assert_eq!(meaning(name), Some(Meaning::Temperature), "{name}");
+        }
     }
 
     #[test]
     fn names_that_only_look_alike_mean_nothing() {
         for name in [
             "angular_velocity_covariance",
-            "gyro_temperature",
+            "temperature_k",
+            "accel_temperature",
             "gyro_clipping",
             "gyro_device_id",
             "gyro_bias_x",
@@ -377,7 +390,7 @@ mod tests {
             "magnitude",
             "magnetic_declination",
             "mag_device_id",
-            "temperature",
+            "template",
             "timestamp_valid",
             "tag",
             "stamped",

@@ -375,6 +375,9 @@ fn beside_gyro(schema: &Schema, gyro: &[PathStep], given: bool, selection: &mut 
                     slot.get_or_insert(path);
                 }
             }
+            Some(Meaning::Temperature) if number && !selection.has(Slot::TEMPERATURE, 1) => {
+                selection.take(vec![path], Slot::TEMPERATURE);
+            }
             Some(Meaning::DeltaVelocity) => velocity = vector(schema, &path, End::from(field), 2),
             Some(Meaning::AccelAxis { axis }) if number => {
                 if let Some(slot) = accel_axes.get_mut(usize::from(axis)) {
@@ -425,7 +428,7 @@ fn find_alone(
     wanted: Wanted,
     selection: &mut Selection,
 ) -> Option<Vec<PathStep>> {
-    let (role, slot) = wanted.vector();
+    let (role, slot, _) = wanted.numbers();
     let mark = match wanted {
         Wanted::Forces => Slot::ACCEL_MARK,
         _ => Slot::MAG_MARK,
@@ -448,6 +451,13 @@ fn find_alone(
                     found = found.or(paths.map(|paths| (paths, path, Some(field))));
                     continue;
                 }
+                (Some(Meaning::Temperature), Wanted::Temperatures) => {
+                    let is_number = End::from(field).number().is_some();
+                    let alone = is_number.then(|| (vec![path.clone()], path, None));
+                    found = found.or(alone);
+                    continue;
+                }
+                (_, Wanted::Temperatures) => continue,
                 _ if is_vector && field.name == "vector" => {
                     let paths = vector(schema, &path, End::from(field), 0);
                     found = found.or(paths.map(|paths| (paths, path, None)));
@@ -629,7 +639,7 @@ pub(super) fn available(schema: &Schema, role: FieldRole) -> Vec<String> {
                     stamp_at(schema, &path, end, TimeUnit::ByMagnitude, 2).is_some()
                         && (end.number().is_none() || names::meaning(&field.name).is_some())
                 }
-                FieldRole::Interval => end.number().is_some(),
+                FieldRole::Interval | FieldRole::Temperature => end.number().is_some(),
             };
             if fits {
                 list.push(path_text(schema, &path));

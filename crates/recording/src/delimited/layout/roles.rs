@@ -236,6 +236,14 @@ impl Roles<'_> {
         };
         let whose = self.whose(fillings.gyro.as_ref().or(fillings.turn.as_ref()))?;
         let (mut of, mut assumed) = self.placed(&fillings, &instants)?;
+        let temperature = self.temperature()?;
+        if let Some((at, said, _)) = &temperature {
+            if of.iter().any(|(taken, _)| taken == at) {
+                return Err(self.two_roles(*at));
+            }
+            of.push((*at, Column::Temperature));
+            assumed.push(said.clone());
+        }
         let is_free = |at: &usize| of.iter().all(|(taken, _)| taken != at);
         let date = instants.date.filter(is_free).map(|at| (at, Column::Date));
         of.extend(date);
@@ -249,6 +257,9 @@ impl Roles<'_> {
         notes.extend(instants.notes);
         table.has_decimal_comma = self.has_decimal_comma(&of);
         fillings.declare_units(&mut table, period);
+        if let Some((_, _, Unit::Temperature(scale, zero))) = temperature {
+            table.scales.temperature = [scale, zero];
+        }
         if let Some(axes) = &self.preamble.orientation {
             notes.push(match axes.parse::<BodyAxes>() {
                 Ok(_) => format!(
@@ -306,12 +317,52 @@ impl Roles<'_> {
             before.any(|(other, _)| other == at).then_some(*at)
         };
         if let Some(at) = of.iter().enumerate().find_map(twice) {
-            return Err(
-                Diagnostic::new(format!("column {} has two roles", self.listed(&[at])))
-                    .help(format!("{COLUMNS} gives each its own")),
-            );
+            return Err(self.two_roles(at));
         }
         Ok((of, assumed))
+    }
+
+    fn two_roles(&self, at: usize) -> Diagnostic {
+        Diagnostic::new(format!("column {} has two roles", self.listed(&[at])))
+            .help(format!("{COLUMNS} gives each its own"))
+    }
+
+    /// The column of a temperature, the words that give it, and its unit: of several by name that of the gyro, else the
+    /// first, in degrees Celsius where nothing says another.
+    ///
+    /// # Errors
+    /// A column that was named and is not there.
+    fn temperature(&self) -> Result<Option<(usize, String, Unit)>, Diagnostic> {
+        const NAME: &str = "temperature";
+        let celsius = Unit::Temperature(1.0, 0.0);
+        let given = self.given_of(Role::Temperature);
+        let unit_of = |at: usize| match self.names.get(at).and_then(|name| name.unit.as_ref()) {
+            Some(Ok(unit @ Unit::Temperature(..))) => Some(*unit),
+            // In brackets, and none of it.
+            Some(_) => None,
+            None => Some(celsius),
+        };
+        let found = match given.map(|given| given.columns.as_slice()) {
+            Some([]) => None,
+            Some([column, ..]) => {
+                let at =
+                    place(self.names, column).map_err(|why| format!("{COLUMNS} {NAME}: {why}"))?;
+                let stated = given.and_then(|given| given.unit);
+                Some((at, stated.or(unit_of(at)).unwrap_or(celsius)))
+            }
+            None => {
+                let each = self.names.iter().enumerate();
+                let ranked = each.filter_map(|(at, name)| match name.meant {
+                    Meant::Temperature(rank) if !self.is_empty(at) => Some((rank, at)),
+                    _ => None,
+                });
+                ranked.min().and_then(|(_, at)| Some((at, unit_of(at)?)))
+            }
+        };
+        Ok(found.map(|(at, unit)| {
+            let said = format!("{NAME}={}:{}", self.reference(at), unit.stated());
+            (at, said, unit)
+        }))
     }
 
     pub(super) fn given_of(&self, role: Role) -> Option<&Given> {

@@ -89,6 +89,7 @@ pub(super) fn next<'a>(bytes: &mut &'a [u8]) -> Option<Attitude<'a>> {
             status: Status::OK,
             reset_count: 0,
             log: stamp,
+            temperature: None,
         },
     })
 }
