@@ -38,7 +38,7 @@ pub(super) struct Scales {
     pub(super) gyro: f64,
     pub(super) accel: f64,
     pub(super) mag: f64,
-    /// Of a temperature: degrees Celsius in one of it, and its zero.
+    /// Unit of a temperature: degrees Celsius in one of it, and where it has its zero.
     pub(super) temperature: [f64; 2],
 }
 

@@ -27,7 +27,7 @@ const SYNTHETIC_HEADER: &[u8] =
 /// Rows of attitudes or samples.
 #[derive(Debug)]
 struct Rows {
-    /// What is in the last column of each.
+    /// Content of the last column of each row.
     last: String,
     /// Whether the acceleration without gravity follows.
     is_accelerated: bool,

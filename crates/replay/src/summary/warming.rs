@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 /// Pairs that are kept; beyond, every second one goes, again and again.
 const MOST: usize = 400;
-/// What a bias may wander beside its temperature, rad/s (0.02 deg/s): no pair weighs more.
+/// Wander of a bias beside its temperature, rad/s (0.02 deg/s): no pair weighs more.
 const WANDER: f64 = 3.5e-4;
 /// Sigma of a bias from which it is learned, rad/s (0.2 deg/s).
 const LEARNED: f64 = 3.5e-3;
