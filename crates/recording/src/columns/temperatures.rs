@@ -6,7 +6,7 @@
 use super::units::{Quantity, Unit};
 
 /// Words for it.
-const TEMPERATURE: [&str; 4] = ["temp", "temperature", "temperatur", "temps"];
+const TEMPERATURE: [&str; 3] = ["temp", "temperature", "temps"];
 /// Words that may stand beside it, those of a gyro first.
 const GYRO: [&str; 4] = ["gyro", "gyr", "gyroscope", "g"];
 const SENSOR: [&str; 8] = [
