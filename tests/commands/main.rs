@@ -10,6 +10,7 @@ mod accelerations;
 mod advice;
 mod allan;
 mod bad_input;
+mod broken_axes;
 mod calibration;
 mod check;
 mod cli;

@@ -39,6 +39,7 @@
 //! An increment that states its own interval keeps it for its angle; where stamps and
 //! intervals disagree by less than half an interval, the stamps are taken to jitter.
 
+mod broken;
 mod clock;
 mod follow;
 mod frozen;
@@ -55,6 +56,7 @@ mod spacing;
 pub(crate) mod spikes;
 mod timing;
 mod unit_change;
+mod wrapped;
 
 pub mod quality;
 pub mod regularise;

@@ -272,6 +272,13 @@ impl Consistency {
         })
     }
 
+    /// Whether gravity wanders in the integrated frame as it does of no healthy sensor at ease: something is wrong, or the
+    /// body is shaken.
+    #[must_use]
+    pub fn wanders(&self) -> bool {
+        self.bank.is_some()
+    }
+
     /// Median scatter of gravity in the last segments when true rates are `factor` times the recorded ones of
     /// other axes, g; `None` where there is nothing to judge by.
     #[must_use]

@@ -18,6 +18,10 @@ const REPEATED: i64 = 2_000_000_000;
 const FOLLOWED: i64 = 250_000_000;
 /// Fields at one reading, as large as any, below which it is no end of a range.
 const LEAST_AT_END: u64 = 20;
+/// Different fields after which an axis that reads but one value is dead, if another one changed by so much of their
+/// length.
+const LEAST_FIELDS: u64 = 100;
+const TURNED: f64 = 0.3;
 /// Across a longer step between rates, ns, nothing is known of the rotation.
 const STEP: i64 = 500_000_000;
 
@@ -40,6 +44,8 @@ pub(crate) struct FieldWatch {
     is_frozen: bool,
     frozen: Option<Frozen>,
     rails: Rails,
+    /// Lowest and highest reading of each axis.
+    range: [Vector3<f64>; 2],
 }
 
 /// Axis of a magnetometer at the end of its range.
@@ -69,6 +75,7 @@ impl FieldWatch {
             is_frozen: false,
             frozen: None,
             rails: Rails::new(),
+            range: [Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)],
         }
     }
 
@@ -86,6 +93,8 @@ impl FieldWatch {
         self.thaw(stamp);
         self.changes += 1;
         self.rails.push(&field.into());
+        let [lowest, highest] = &self.range;
+        self.range = [lowest.inf(&field), highest.sup(&field)];
         self.field = Some(field);
         (self.since, self.anchor) = (stamp, stamp);
     }
@@ -171,6 +180,16 @@ impl FieldWatch {
         found.max_by_key(|found| found.samples)
     }
 
+    /// The axis that reads but one value, and that, though the field turned about the others.
+    pub(crate) fn dead_axis(&self) -> Option<(usize, f64)> {
+        let [lowest, highest] = &self.range;
+        let spans = highest - lowest;
+        let length = self.field.unwrap_or_default().norm();
+        let turned = self.changes >= LEAST_FIELDS && spans.amax() > TURNED * length;
+        let dead = (0..3).find(|axis| spans[*axis] == 0.0).filter(|_| turned)?;
+        Some((dead, lowest[dead]))
+    }
+
     /// Number of fields, if none of them is more than zero.
     pub(crate) fn empty(&self) -> Option<u64> {
         (self.count > 0 && self.empty == self.count).then_some(self.count)
@@ -244,6 +263,24 @@ mod tests {
         assert_eq!(frozen.from, Nanos(5_000_000_000));
         assert!((frozen.secs - 4.99).abs() < 1e-9, "{frozen:?}");
         assert!(watched(0.5, |_| [0.0; 3]).no_field(1000).is_some());
+        // About an axis that reads nothing, by a field that turns; of one that hardly turns it may be so.
+        let about_x = |by: f64| {
+            move |i: i64| {
+                let (sin, cos) = (by * i as f64).sin_cos();
+                [0.0, 20.0 * cos, 20.0 * sin]
+            }
+        };
+        assert_eq!(watched(1.0, about_x(-0.01)).dead_axis(), Some((0, 0.0)));
+        assert_eq!(watched(1.0, about_x(-1e-4)).dead_axis(), None);
+        let noisy = |i: i64| {
+            [
+                0.1 * (i % 3) as f64,
+                20.0 + 0.01 * (i % 7) as f64,
+                (i % 50) as f64,
+            ]
+        };
+        let noisy = watched(1.0, noisy);
+        assert_eq!(noisy.dead_axis(), None);
         assert!(watched(0.5, |_| [f64::NAN; 3]).no_field(0).is_some());
     }
 }

@@ -4,6 +4,7 @@
 //! here. Thresholds are opinions, and lie here too, beside the words; what is counted of the samples for them is in
 //! [`strapd_attitude::condition::quality`]. A finding's `code` is stable: scripts match on it.
 
+mod axes;
 mod cures;
 mod live;
 mod magnetometer;

@@ -75,34 +75,9 @@ impl Browser {
 
     fn with(turn: Turn) -> Browser {
         let programme = programme();
-        let profile = tempfile::tempdir().unwrap();
-        let mut child = Command::new(programme)
-            .args(["--headless", "--no-sandbox", "--disable-gpu"])
-            .args(["--no-first-run", "--disable-extensions", "--disable-sync"])
-            .args([
-                "--disable-background-networking",
-                "--disable-component-update",
-            ])
-            .args(["--disable-dev-shm-usage", "--hide-scrollbars"])
-            .arg("--remote-debugging-port=0")
-            .arg(format!("--user-data-dir={}", profile.path().display()))
-            .arg("about:blank")
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut said = BufReader::new(child.stderr.take().unwrap()).lines();
-        let address = said
-            .by_ref()
-            .map(Result::unwrap)
-            .find_map(|line| {
-                line.strip_prefix("DevTools listening on ")
-                    .map(str::to_owned)
-            })
-            .expect("Chromium did not start");
-        // It goes on talking, and must not wait for a reader.
-        std::thread::spawn(move || said.for_each(drop));
+        // One in thousands says nothing, and would be waited for without end.
+        let mut begun = (0..3).filter_map(|_| Browser::begun(&programme));
+        let (child, profile, address) = begun.next().expect("Chromium did not start");
         let host = address
             .trim_start_matches("ws://")
             .split('/')
@@ -122,6 +97,43 @@ impl Browser {
         };
         browser.page();
         browser
+    }
+
+    /// A programme that said in time at which address it listens.
+    fn begun(programme: &str) -> Option<(Child, tempfile::TempDir, String)> {
+        let profile = tempfile::tempdir().unwrap();
+        let mut child = Command::new(programme)
+            .args(["--headless", "--no-sandbox", "--disable-gpu"])
+            .args(["--no-first-run", "--disable-extensions", "--disable-sync"])
+            .args([
+                "--disable-background-networking",
+                "--disable-component-update",
+            ])
+            .args(["--disable-dev-shm-usage", "--hide-scrollbars"])
+            .arg("--remote-debugging-port=0")
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg("about:blank")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let said = BufReader::new(child.stderr.take().unwrap()).lines();
+        let (tell, told) = std::sync::mpsc::channel();
+        // It goes on talking, and must not wait for a reader.
+        std::thread::spawn(move || {
+            for line in said.map_while(Result::ok) {
+                if let Some(address) = line.strip_prefix("DevTools listening on ") {
+                    let _ = tell.send(address.to_owned());
+                }
+            }
+        });
+        let Ok(address) = told.recv_timeout(PATIENCE) else {
+            let _ = child.kill();
+            let _ = child.wait();
+            return None;
+        };
+        Some((child, profile, address))
     }
 
     /// A new page, from now on the one spoken to.

@@ -78,7 +78,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 21] = [
+const FAULTS: [Fault; 24] = [
     ("good", |_, _| {}, "", ""),
     (
         "reversed",
@@ -136,6 +136,19 @@ const FAULTS: [Fault; 21] = [
         |n, s| s.accel[0] += if n % 300 == 250 { 78.0 } else { 0.0 },
         "accel-spikes",
         "spikes keep",
+    ),
+    ("dead", |_, s| s.gyro[1] = 0.0, "axis-dead", ""),
+    (
+        "field dead",
+        |_, s| s.mag[1] = 0.0,
+        "field-axis-dead",
+        "aid gravity",
+    ),
+    (
+        "wraps",
+        |_, s| s.gyro = s.gyro.map(|v| (v + 1.1).rem_euclid(2.2) - 1.1),
+        "wrapped",
+        "",
     ),
     (
         "hangs",

@@ -7,6 +7,8 @@
 /// Fewest samples, and by the samples for which the axis usually repeats a reading.
 const LEAST: u64 = 25;
 const TIMES_USUAL: f64 = 20.0;
+/// Samples in which another axis moves that an axis without any change is dead after.
+const DEAD: u64 = 100;
 /// Rate of another axis, rad/s, at which it surely moves.
 const MOVES: f64 = 0.3;
 /// Changes of an axis after which its usual run is known.
@@ -72,6 +74,12 @@ impl FrozenAxes {
         for ((axis, rate), other) in self.axes.iter_mut().zip(gyro).zip(others) {
             axis.push(*rate, other);
         }
+    }
+
+    /// The only reading of each axis that has but one, while another moved for long.
+    pub(super) fn dead(&self) -> [Option<f64>; 3] {
+        self.axes
+            .map(|axis| (axis.changes == 1 && axis.moved >= DEAD).then_some(axis.last))
     }
 
     /// The longest that each axis was frozen.

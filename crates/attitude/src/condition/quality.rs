@@ -6,13 +6,14 @@
 mod gravity;
 mod summary;
 
+pub use super::broken::{AxisFault, BrokenAxes};
 pub use super::frozen::FrozenAxis;
 pub use super::rails::Clipped;
+pub use super::wrapped::WrappedAxis;
 pub use gravity::GyroAgainstGravity;
 pub use summary::{AxisStats, GravityAxis, OffsetStats, SpacingStats};
 
 use super::clock::{Clock, Turns};
-use super::frozen::FrozenAxes;
 use super::histogram::Histogram;
 use super::rails::Rails;
 use super::regularise::{Lines, Uneven};
@@ -88,7 +89,7 @@ pub struct QualitySummary {
     /// End of the range at which each was clipped, where its unit is rad/s, and where it is deg/s.
     pub clipped: [[Option<Clipped>; 3]; 2],
     /// Reading that each hung at while others moved, for the same two units.
-    pub frozen: [[Option<FrozenAxis>; 3]; 2],
+    pub broken: [[AxisFault; 3]; 2],
     /// Samples with an acceleration.
     pub with_accel: u64,
     /// Number of these with NaN or infinity.
@@ -140,7 +141,7 @@ pub struct Quality {
     last_row_lone_zero: bool,
     axes: [Axis; 3],
     rails: Rails,
-    frozen: [FrozenAxes; 2],
+    broken: [BrokenAxes; 2],
     previous: Option<[f64; 3]>,
     first_orientation: Option<[f64; 4]>,
     offset: Offset,
@@ -188,7 +189,7 @@ impl Quality {
             last_row_lone_zero: false,
             axes: [Axis::EMPTY; 3],
             rails: Rails::new(),
-            frozen: [1.0, 1.0_f64.to_degrees()].map(FrozenAxes::new),
+            broken: [1.0, 1.0_f64.to_degrees()].map(BrokenAxes::new),
             previous: None,
             first_orientation: None,
             offset: Offset::default(),
@@ -359,7 +360,7 @@ impl Quality {
             axis.push(v);
         }
         self.rails.push(&gyro);
-        self.frozen.iter_mut().for_each(|axes| axes.push(&gyro));
+        self.broken.iter_mut().for_each(|axes| axes.push(&gyro));
         Some(gyro)
     }
 

@@ -40,7 +40,7 @@ impl SpikeCount {
 /// Longest run of samples that can be a spike.
 const LONGEST: usize = 3;
 /// Longest time that two or more samples of a spike take, ns: a longer pulse is motion.
-const LONGEST_NANOS: i64 = 12_000_000;
+const LONGEST_NANOS: i64 = 20_000_000;
 /// Longest step, ns, at which one sample alone can be a spike: at a longer one a flick of the hand is one sample.
 const LONGEST_STEP_NANOS: i64 = 25_000_000;
 /// Steps that a run and its neighbours may take, in times of the ordinary: a burst of stamps passes, a hole does not.

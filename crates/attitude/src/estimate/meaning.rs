@@ -198,7 +198,8 @@ impl Meaning {
     }
 
     /// Recorded rates in rad/s, axes as recorded.
-    pub(super) fn rates(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    #[must_use]
+    pub fn rates(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let ([a, b, c], unit) = (self.gyro_scale, self.unit.to_rad());
         [x * unit * a, y * unit * b, z * unit * c]
     }

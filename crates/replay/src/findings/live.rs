@@ -4,7 +4,7 @@
 //! memory, and what was once certain is certain from then on.
 
 use super::samples::{self, Seen};
-use super::{Finding, Severity, magnetometer, run, sensors, stream};
+use super::{Finding, Severity, axes, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
 use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_UNIT_CHANGE, MIXED};
 use crate::inspection::{Aids, Inspection};
@@ -16,7 +16,7 @@ use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 15] = [
+const LASTING: [&str; 18] = [
     "gyro-axes",
     "gyro-scale",
     "gyro-turned",
@@ -25,8 +25,11 @@ const LASTING: [&str; 15] = [
     "mag-iron",
     "saturated",
     "stuck",
+    "wrapped",
+    axes::DEAD,
     "field-frozen",
     "field-saturated",
+    "field-axis-dead",
     "field-empty",
     MIXED,
     GYRO_UNIT_CHANGE,
@@ -229,9 +232,13 @@ impl SensorWatch {
         let frozen = self.field.frozen_so_far();
         now.extend(frozen.map(|frozen| run::field_frozen(estimator.conditioning(), frozen)));
         now.extend(self.field.saturated().map(run::field_saturated));
+        now.extend(self.field.dead_axis().map(run::field_axis_dead));
         let empty = self.field.empty().filter(|n| *n >= FIELDS);
         now.extend(empty.map(field_empty));
         let gyro = estimator.consistency();
+        let [faults, _] = &self.looked.quality.broken;
+        let wanders = gyro.is_some_and(Consistency::wanders);
+        now.extend(axes::broken(faults, wanders));
         let resolved = &self.looked.resolved;
         let first = estimator.conditioning().first;
         let changed = gyro.and_then(|gyro| stream::axes_changed(gyro, plan, first, true));

@@ -1,19 +1,19 @@
 //! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
-use super::{Finding, Severity, cures, magnetometer, orientation, samples, sensors, stream};
+use super::{Finding, Severity, axes, cures, magnetometer, orientation, samples, sensors, stream};
 use crate::field_watch::Saturated;
 use crate::summary::aid::Frozen;
 use crate::summary::clocks::{clock_was_set, counter_wraps};
 use crate::summary::{Gaps, TopicSummary, significant};
-use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
+use strapd_attitude::condition::quality::{AxisFault, LONGEST_GAP_NANOS};
 use strapd_attitude::condition::{Report, SpikeCount};
 use strapd_attitude::consistency::{Consistency, FieldConsistency};
 use strapd_attitude::estimate::{EstimationSettings, Meaning, batches_message};
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
-    AGAINST_RECORDED, GYRO_RANGE, GYRO_UNIT, MAX_GAP, ON_GAP, RATE_HZ, REGULARISE_STAMPS, SPIKES,
-    START, TIME, TOPIC, UNTIL,
+    AGAINST_RECORDED, AID, GYRO_RANGE, GYRO_UNIT, MAX_GAP, ON_GAP, RATE_HZ, REGULARISE_STAMPS,
+    SPIKES, START, TIME, TOPIC, UNTIL,
 };
 
 /// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
@@ -39,6 +39,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) frozen_field: Option<Frozen>,
     /// Axis of the magnetometer at the end of its range.
     pub(crate) saturated_field: Option<Saturated>,
+    /// Axis of the magnetometer that reads but one value, and that.
+    pub(crate) dead_field: Option<(usize, f64)>,
     /// Frames of other bodies on the topic, and how many messages named them.
     pub(crate) left_out: &'a [(String, u64)],
     /// Gyro held against accelerometer, with what the samples were taken for.
@@ -47,6 +49,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) field: Option<(&'a FieldConsistency, &'a EstimationSettings)>,
     /// Orientations that were compared with; `None` where none were to be.
     pub(crate) references: Option<u64>,
+    /// Faults of single axes of the gyro.
+    pub(crate) axes: [AxisFault; 3],
 }
 
 /// Everything a replay says of a topic beside its numbers. The gaps have a line of their own there.
@@ -83,6 +87,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             .map(|frozen| field_frozen(noted.conditioning, frozen)),
     );
     out.extend(noted.saturated_field.map(field_saturated));
+    out.extend(noted.dead_field.map(field_axis_dead));
     out.extend(samples::zero_rows(noted.zeros, total));
     if noted.stamps_carried > 0 {
         let n = noted.stamps_carried;
@@ -125,6 +130,9 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     }
     out.extend(stream::find(noted.conditioning, false));
     out.extend(saturated(noted.conditioning));
+    out.extend(axes::hung(&noted.axes));
+    let wanders = noted.gyro.is_some_and(|(gyro, ..)| gyro.wanders());
+    out.extend(axes::broken(&noted.axes, wanders));
     out.extend(spikes(noted.conditioning));
     out.extend(force_spikes(noted.conditioning));
     if let Some(references) = noted.references.filter(|_| summary.against.is_empty()) {
@@ -286,6 +294,25 @@ pub(super) fn field_frozen(report: &Report, frozen: Frozen) -> Finding {
     .with("secs", frozen.secs)
     .with("first_at_s", at)
     .advise("the heading is the gyro's there: the magnetometer or its driver hung")
+}
+
+/// Finding of a magnetometer of which one axis reads but one value.
+pub(super) fn field_axis_dead((axis, reading): (usize, f64)) -> Finding {
+    let name = axes::name(axis);
+    Finding::new(
+        Severity::Error,
+        "field-axis-dead",
+        format!(
+            "magnetometer {name} reads {} in every sample while the others turn: dead?",
+            significant(reading, 4)
+        ),
+    )
+    .with("axis", name)
+    .with("reading", reading)
+    .advise(
+        "two axes of a field tell no heading: the magnetometer or its driver is broken; without it",
+    )
+    .help([AID.to("gravity")])
 }
 
 /// A magnetometer at the end of its range.

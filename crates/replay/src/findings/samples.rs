@@ -10,7 +10,7 @@ mod tests;
 
 pub(super) use self::gravity::COUNTS;
 pub(super) use self::stamps::missing_samples;
-use super::{Finding, Severity, verdicts};
+use super::{Finding, Severity, axes, verdicts};
 use crate::inspection::Inspection;
 use crate::summary::significant;
 use serde_json::json;
@@ -178,15 +178,15 @@ fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let [in_rad, in_degrees] = &seen.looked.quality.clipped;
     let is_in_degrees = seen.unit > 1.0;
     let clipped = if is_in_degrees { in_degrees } else { in_rad };
-    let [in_rad, in_degrees] = &seen.looked.quality.frozen;
-    let frozen = if is_in_degrees { in_degrees } else { in_rad };
+    let [in_rad, in_degrees] = &seen.looked.quality.broken;
+    let broken = if is_in_degrees { in_degrees } else { in_rad };
     // One that never reads anything else is not there, or not turned about.
     let moving = axes
         .iter()
         .enumerate()
         .filter(|(_, stats)| stats.min < stats.max);
     for (axis, stats) in moving {
-        let name = axis_name(axis);
+        let name = axes::name(axis);
         if let Some(Clipped { level: at, samples }) = clipped.get(axis).copied().flatten() {
             let level = significant(at, 5);
             let unit = if is_in_degrees { "deg/s" } else { "rad/s" };
@@ -210,21 +210,9 @@ fn clipped_or_stuck(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         let mut others = axes.iter().enumerate().filter(|(i, _)| *i != axis);
         let others_move = others.any(|(_, other)| other.longest_run * 10 < stats.longest_run);
         let long = Some(stats.longest_run).filter(|run| *run >= STUCK_SAMPLES && others_move);
-        let frozen = frozen.get(axis).copied().flatten();
-        if let Some(samples) = frozen.map(|frozen| frozen.samples).or(long) {
-            out.push(
-                Finding::new(
-                    Severity::Error,
-                    "stuck",
-                    format!(
-                        "gyro {name} repeats one value {samples} times in a row while the others move: stuck?"
-                    ),
-                )
-                .with("axis", name)
-                .with("samples", samples)
-                .advise("one axis repeats itself while the others move: the sensor or its driver is broken"),
-            );
-        }
+        let frozen = broken.get(axis).and_then(|fault| fault.frozen);
+        let samples = frozen.map(|frozen| frozen.samples).or(long);
+        out.extend(samples.map(|samples| axes::stuck(axis, samples)));
     }
 }
 
@@ -239,14 +227,14 @@ fn silent(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         out.push(
             Finding::new(
                 Severity::Note,
-                "axis-silent",
+                axes::SILENT,
                 format!(
                     "gyro {} reads {} in every sample",
-                    axis_name(axis),
+                    axes::name(axis),
                     significant(stats.min, 4)
                 ),
             )
-            .with("axis", axis_name(axis))
+            .with("axis", axes::name(axis))
             .with("reading", stats.min)
             .advise("fine for a body that turns about one axis; a real sensor has noise"),
         );
@@ -381,8 +369,4 @@ pub(super) fn some(
             .with("samples", total)
             .advise(advice)
     })
-}
-
-fn axis_name(axis: usize) -> &'static str {
-    ["x", "y", "z"].get(axis).copied().unwrap_or("?")
 }

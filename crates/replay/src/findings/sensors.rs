@@ -4,7 +4,7 @@
 //! `strapd_attitude::consistency`. A cure is advised where the recording, integrated with it, agrees.
 
 use super::samples::COUNTS;
-use super::{Finding, Severity};
+use super::{Finding, Severity, axes};
 use crate::summary::significant;
 use nalgebra::Matrix3;
 use strapd_attitude::condition::GyroUnit;
@@ -342,6 +342,9 @@ pub(super) fn is_guess(code: &str) -> bool {
 
 /// Leaves of several findings about one cause the one that knows it best.
 pub(super) fn settle(found: &mut Vec<Finding>) {
+    if found.iter().any(|f| f.code == axes::DEAD) {
+        found.retain(|f| f.code != axes::SILENT);
+    }
     let Some(cause) = found.iter().find(|f| [AXES, SCALE].contains(&f.code)) else {
         if found.iter().any(|f| f.evidence.contains_key(COUNTS)) {
             let others = ["unit-unknown", "gyro-against-gravity"];

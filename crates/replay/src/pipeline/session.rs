@@ -16,12 +16,13 @@ use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Histogram;
+use strapd_attitude::condition::quality::BrokenAxes;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_attitude::quaternion::BodyRate;
-use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::{Item, PayloadNotes};
@@ -66,6 +67,8 @@ pub(super) struct Topic {
     pub recorded: Option<RecordedTrack>,
     /// The bias against the temperature of its samples.
     pub warming: WarmingWatch,
+    /// Faults of single axes of the gyro.
+    pub broken: BrokenAxes,
 }
 
 /// Time between two looks at the bias and its temperature, ns.
@@ -225,6 +228,7 @@ impl Topic {
             history: None,
             recorded: None,
             warming: WarmingWatch::default(),
+            broken: BrokenAxes::new(1.0),
         })
     }
 
@@ -348,6 +352,11 @@ impl Session {
                 self.samples += 1;
                 topic.estimator.take(&raw);
                 topic.zeros.take(raw.gyro);
+                let kind = topic.resolved.kind;
+                let is_rate = matches!(kind, SampleKind::Rate | SampleKind::Average);
+                if let Some(gyro) = raw.gyro.filter(|_| is_rate) {
+                    topic.broken.push(&topic.resolved.rates(gyro));
+                }
                 if let Some(history) = &mut topic.history {
                     history.took(Some(&raw), &topic.estimator.conditioning().counts);
                 }

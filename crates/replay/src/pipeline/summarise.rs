@@ -94,6 +94,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             stamps_carried: topic.noticed.stamps_carried.load(Ordering::Relaxed),
             left_out: &topic.noticed.left_out(),
             frozen_field: topic.field.as_ref().and_then(FieldWatch::frozen),
+            dead_field: topic.field.as_ref().and_then(FieldWatch::dead_axis),
             saturated_field: topic.field.as_ref().and_then(FieldWatch::saturated),
             gyro: topic
                 .estimator
@@ -103,6 +104,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
                 .estimator
                 .field_consistency()
                 .map(|consistency| (consistency, &run.plan)),
+            axes: topic.broken.found(),
             references: topic.against.as_ref().map(|a| a.references() as u64),
         },
     );

@@ -161,7 +161,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         offset: offset(quality, duration_secs),
         axes: quality.axes.map(axis),
         clipped: [1.0, 1.0_f64.to_degrees()].map(|rad| quality.rails.clipped(rad)),
-        frozen: quality.frozen.map(|axes| axes.found()),
+        broken: quality.broken.map(|axes| axes.found()),
         quietest_at: quietest.map(|q| q.start),
         quietest_deviation: quietest.map(|q| q.deviation),
         quietest_rate: quietest.map(|q| q.mean),

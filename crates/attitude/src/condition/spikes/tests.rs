@@ -186,7 +186,7 @@ fn a_glitch_of_the_accelerometer_alone_is_left_out_and_a_blow_is_not() {
     for (found, clean) in out.iter().zip(of(&clean)) {
         assert_eq!((found.gyro, found.status), (clean.gyro, clean.status));
     }
-    // Longer than 12 ms; felt by the gyro; one of many, but for the first; a step that stays.
+    // Longer than 20 ms; felt by the gyro; one of many, but for the first; a step that stays.
     for (n, sample) in raw.iter_mut().enumerate() {
         *sample = clean[n];
         let hit = match n {
