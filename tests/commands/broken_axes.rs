@@ -103,3 +103,41 @@ fn two_wrong_samples_at_100_hz_and_three_at_200_are_repaired() {
         assert_eq!(errors(&said), ["spikes"]);
     }
 }
+
+#[test]
+fn a_replay_says_of_a_body_that_is_upside_down_all_the_time_what_may_be_wrong() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    // For good, or turned over after ten seconds, within one.
+    for (until, expected) in [(6000, true), (1000, false)] {
+        let mut text = "stamp_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n".to_owned();
+        let mut roll = std::f64::consts::PI;
+        for n in 0..6000_usize {
+            let rate = if n >= until && roll > 0.0 {
+                -std::f64::consts::PI
+            } else {
+                0.0
+            };
+            roll += rate * 0.01;
+            let noise = 1e-4 * (n as f64 * 1.7).sin();
+            let (y, z) = (9.81 * roll.sin(), 9.81 * roll.cos());
+            let stamp = 1_000_000_000 + n * 10_000_000;
+            writeln!(text, "{stamp},{},{noise},{noise},0,{y},{z}", rate + noise).unwrap();
+        }
+        std::fs::write(at.join("down.csv"), text).unwrap();
+        let said = strapd(at, "replay down.csv --aid gravity -o null: --json").json();
+        let findings = said["topics"][0]["findings"].to_string();
+        assert_eq!(findings.contains("looks-frd"), expected, "{said}");
+        let stated = strapd(
+            at,
+            "replay down.csv --aid gravity --body frd -o null: --json",
+        )
+        .json();
+        assert!(
+            !stated["topics"][0]["findings"]
+                .to_string()
+                .contains("looks-frd"),
+            "{stated}"
+        );
+    }
+}

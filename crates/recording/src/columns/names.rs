@@ -197,6 +197,8 @@ const STAMP_STRONG: &[&str] = &[
     "elapsed",
     "millis",
     "micros",
+    // Of GNSS: the time of week.
+    "tow",
 ];
 const STAMP_WEAK: &[&str] = &[
     "sample",
@@ -220,6 +222,11 @@ const STAMP_WEAK: &[&str] = &[
     "cal",
     "in",
     "the",
+    "gps",
+    "gnss",
+    "i",
+    "of",
+    "week",
 ];
 
 /// Names of a time of day, and of its date.

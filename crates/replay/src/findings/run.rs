@@ -9,6 +9,7 @@ use strapd_attitude::condition::quality::{AxisFault, LONGEST_GAP_NANOS};
 use strapd_attitude::condition::{Report, SpikeCount};
 use strapd_attitude::consistency::{Consistency, FieldConsistency};
 use strapd_attitude::estimate::{EstimationSettings, Meaning, batches_message};
+use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
@@ -51,6 +52,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) references: Option<u64>,
     /// Faults of single axes of the gyro.
     pub(crate) axes: [AxisFault; 3],
+    /// Whether the body's z points down at rest, and for most of the run.
+    pub(crate) is_upside_down: bool,
 }
 
 /// Everything a replay says of a topic beside its numbers. The gaps have a line of their own there.
@@ -130,6 +133,11 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     }
     out.extend(stream::find(noted.conditioning, false));
     out.extend(saturated(noted.conditioning));
+    if let Some((_, _, resolved)) = noted.gyro.filter(|_| noted.is_upside_down)
+        && resolved.body != BodyAxes::Frd
+    {
+        out.push(samples::upside_down(resolved.body));
+    }
     out.extend(axes::hung(&noted.axes));
     let wanders = noted.gyro.is_some_and(|(gyro, ..)| gyro.wanders());
     out.extend(axes::broken(&noted.axes, wanders));

@@ -8,7 +8,7 @@ mod stamps;
 #[cfg(test)]
 mod tests;
 
-pub(super) use self::gravity::COUNTS;
+pub(super) use self::gravity::{COUNTS, upside_down};
 pub(super) use self::stamps::missing_samples;
 use super::{Finding, Severity, axes, verdicts};
 use crate::inspection::Inspection;

@@ -22,7 +22,7 @@ use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Aid, EstimationSettings};
 use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_attitude::quaternion::BodyRate;
-use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::{Item, PayloadNotes};
@@ -145,7 +145,14 @@ pub(super) struct AttitudeStats {
     pub largest_rate: f64,
     /// Steps between attitudes, nanoseconds.
     steps: Histogram,
+    /// Sum of the vertical parts of the body's z, up positive; and that at the first rest.
+    up: f64,
+    up_at_rest: Option<f64>,
 }
+
+/// Vertical part of the body's z below which it points down at rest, and in the mean of a run.
+const DOWN: f64 = -0.87;
+const MOSTLY_DOWN: f64 = -0.5;
 
 impl AttitudeStats {
     pub(super) fn add(&mut self, samples: &[AttitudeSample]) {
@@ -161,6 +168,12 @@ impl AttitudeStats {
             if let Some(step) = step.filter(|step| *step > 0) {
                 self.steps.add(step);
             }
+            let [_, x, y, _] = sample.q_nb.wxyz();
+            let up = 1.0 - 2.0 * (x * x + y * y);
+            self.up += up;
+            if self.up_at_rest.is_none() && sample.status.has(Status::REST) {
+                self.up_at_rest = Some(up);
+            }
         }
         self.last = samples.last().copied().or(self.last);
         self.count += samples.len() as u64;
@@ -172,6 +185,13 @@ impl AttitudeStats {
 }
 
 impl AttitudeStats {
+    /// Whether the body's z, which is up in a body of forward, left, up, points down at the first rest and for most of the
+    /// time: who lies on his face for a while turns round.
+    pub(super) fn is_upside_down(&self) -> bool {
+        let mean = self.up / self.count.max(1) as f64;
+        self.up_at_rest.is_some_and(|up| up < DOWN) && mean < MOSTLY_DOWN
+    }
+
     /// The median rate, Hz; `None` below two attitudes.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         let step = self.steps.quantile(0.5);

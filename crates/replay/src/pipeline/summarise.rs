@@ -105,6 +105,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
                 .field_consistency()
                 .map(|consistency| (consistency, &run.plan)),
             axes: topic.broken.found(),
+            is_upside_down: topic.output.is_upside_down(),
             references: topic.against.as_ref().map(|a| a.references() as u64),
         },
     );

@@ -106,6 +106,9 @@ fn stamps_are_known_with_their_units() {
         ("SampleTimeFine", None),
         ("Shimmer_B663_Timestamp_Unix_CAL", None),
         ("timestampNanos", Some("ns")),
+        ("GPS_TOW", None),
+        ("iTOW [ms]", Some("ms")),
+        ("TimeOfWeek (s)", Some("s")),
     ] {
         let name = Name::of(text.as_bytes());
         assert_eq!(name.meant, Meant::Stamp, "{text}");

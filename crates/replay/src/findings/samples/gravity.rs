@@ -186,6 +186,19 @@ fn mostly_one_g(looked: &Inspection) -> Option<(f64, &'static str)> {
     Some((near as f64 / finite as f64, unit))
 }
 
+/// Finding of a body whose z points down at rest.
+pub(in crate::findings) fn upside_down(stated: BodyAxes) -> Finding {
+    Finding::new(
+        Severity::Warning,
+        "looks-frd",
+        "gravity reads negative on z at rest: z points down",
+    )
+    .with("stated", stated.to_string())
+    .advise("the body is front, right, down; or its accelerometer says down where it should say up: the gyro agrees with both, and the wrong one mirrors pitch and yaw")
+    .help([BODY.to("frd")])
+    .help([ACCEL_SIGN.to("kinematic")])
+}
+
 /// A body whose z does not point up at rest.
 pub(super) fn mounting(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let stated = seen.looked.resolved.body;
@@ -197,17 +210,7 @@ pub(super) fn mounting(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     out.extend(match gravity {
         None => None,
         Some(GravityAxis { axis: 2, positive }) => {
-            (!positive && stated != BodyAxes::Frd).then(|| {
-                Finding::new(
-                    Severity::Warning,
-                    "looks-frd",
-                    "gravity reads negative on z at rest: z points down",
-                )
-                .with("stated", stated.to_string())
-                .advise("the body is front, right, down; or its accelerometer says down where it should say up: the gyro agrees with both, and the wrong one mirrors pitch and yaw")
-                .help([BODY.to("frd")])
-                .help([ACCEL_SIGN.to("kinematic")])
-            })
+            (!positive && stated != BodyAxes::Frd).then(|| upside_down(stated))
         }
         Some(gravity) => Some(
             Finding::new(
