@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,3 +155,19 @@ def test_acceleration_without_gravity_is_that_of_the_body() -> None:
     assert "linear_acceleration_x" not in plain.to_dict()
     with pytest.raises(ValueError, match="no vertical"):
         strapd.integrate(exact.gyr, t=exact.t, linear_acceleration=True)
+
+
+def test_a_temperature_stays_with_the_attitudes_of_a_recording(tmp_path: Path) -> None:
+    def replayed(name: str, behind: Callable[[int], str]) -> strapd.Attitude:
+        head = "stamp_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z" + name
+        rows = (f"{10**9 + n * 10**7},0.1,0,{0.2 + 0.001 * (n % 7)},0,0,9.81{behind(n)}" for n in range(1000))
+        (tmp_path / "log.csv").write_text("\n".join([head, *rows]) + "\n")
+        return strapd.replay(tmp_path / "log.csv")
+
+    att = replayed(",temperature_c", lambda n: f",{20 + n // 100}.25")
+    assert att.temperature.dtype == np.float32 and (att.temperature == [20.25 + n // 100 for n in range(1000)]).all()
+    assert (att[100:300:100].temperature == [21.25, 22.25]).all() and "temperature_c" in att.to_dict()
+    assert att.summary["temperature"]["range_degc"] == [20.25, 29.25]
+    none = replayed("", lambda n: "")
+    assert np.isnan(none.temperature).all() and "temperature_c" not in none.to_dict()
+    assert none.summary["temperature"] is None
