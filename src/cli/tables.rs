@@ -11,8 +11,9 @@ use strapd_recording::decode::Options;
 pub struct Tables {
     /// Columns of a table, by name or number from 1: ROLE=NAME:NAME:NAME[:UNIT[*FACTOR]],ROLE=...
     ///
-    /// ROLE is one of gyro, accel, mag, dq, dv (x:y:z), orientation (w:x:y:z), stamp, dt, counter, sensor, temperature. `info` and
-    /// the summary print what they assumed. Roles that are not given are found by name; =none leaves one out.
+    /// ROLE is one of gyro, accel, mag, dq, dv (x:y:z), orientation (w:x:y:z), stamp, dt, counter, sensor,
+    /// temperature. `info` and the summary print what they assumed. Roles that are not given are found by name; =none
+    /// leaves one out.
     #[arg(long, value_name = "ROLE=NAMES")]
     pub columns: Option<String>,
     /// Delimiter between the cells of a table: tab, semicolon, comma, pipe, blanks, or a punctuation mark

@@ -28,7 +28,10 @@ pub(in crate::cli) fn rate(id: &str, seq: u64, raw: &RawSample, kind: Option<Sam
         }
         // With its own digits: as the nearest double it would have more.
         let digits = |temperature: f32| temperature.to_string().parse::<f64>().ok();
-        if let Some(temperature) = raw.temperature.and_then(digits) {
+        let stated = raw
+            .temperature
+            .filter(|temperature| temperature.is_finite());
+        if let Some(temperature) = stated.and_then(digits) {
             put("temperature_c", json!(temperature));
         }
         if let Some(kind) = kind {

@@ -275,11 +275,6 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
 pub(super) fn warming(warming: &Warming) -> Option<Result<String, String>> {
     let fitted = warming.line()?;
     let pairs = warming.pairs();
-    let ends = pairs.iter().map(|pair| pair.temperature);
-    let (coldest, warmest) = (
-        ends.clone().fold(f64::MAX, f64::min),
-        ends.fold(f64::MIN, f64::max),
-    );
     let mut series = Vec::new();
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let points = pairs
@@ -295,11 +290,7 @@ pub(super) fn warming(warming: &Warming) -> Option<Result<String, String>> {
             let bias = fitted.middle[axis] + fitted.slope[axis] * (temperature - fitted.at);
             [temperature, bias.to_degrees()]
         };
-        series.push(bound(
-            "",
-            vec![on_line(coldest), on_line(warmest)],
-            axis + 1,
-        ));
+        series.push(bound("", fitted.ends.map(on_line).into(), axis + 1));
     }
     let chart = Chart {
         title: "Bias against temperature, deg/s".to_owned(),

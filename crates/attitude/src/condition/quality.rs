@@ -88,7 +88,7 @@ pub struct QualitySummary {
     pub axes: [AxisStats; 3],
     /// End of the range at which each was clipped, where its unit is rad/s, and where it is deg/s.
     pub clipped: [[Option<Clipped>; 3]; 2],
-    /// Reading that each hung at while others moved, for the same two units.
+    /// Faults of each, for the same two units.
     pub broken: [[AxisFault; 3]; 2],
     /// Samples with an acceleration.
     pub with_accel: u64,

@@ -17,24 +17,18 @@ const SENSOR: [&str; 8] = [
 pub(crate) fn temperature(words: &[String]) -> Option<(u8, Option<Unit>)> {
     let is = |known: &[&str], word: &String| known.contains(&word.as_str());
     let at = words.iter().position(|word| is(&TEMPERATURE, word))?;
-    let behind = words.get(at + 1..)?;
-    let unit = match behind {
-        [] => None,
-        unit => Some(Unit::of(Quantity::Temperature, &unit.concat())),
-    };
-    // `temp_imu`: what stands behind may be whose it is.
-    let (unit, whose) = match unit {
-        Some(None) => (None, [words.get(..at)?, behind].concat()),
-        Some(unit) => (unit, words.get(..at)?.to_vec()),
-        None => (None, words.get(..at)?.to_vec()),
-    };
-    let rank = match whose.as_slice() {
-        [] => 2,
-        all if all.iter().all(|word| is(&GYRO, word) || is(&SENSOR, word)) => {
-            u8::from(!all.iter().any(|word| is(&GYRO, word)))
-        }
-        _ => return None,
-    };
+    let (before, behind) = (words.get(..at)?, words.get(at + 1..)?);
+    let unit = Unit::of(Quantity::Temperature, &behind.concat());
+    // `temp_imu`: what stands behind, and is no unit, is whose it is.
+    let behind = behind.iter().filter(|_| unit.is_none());
+    let mut rank = 2;
+    for word in before.iter().chain(behind) {
+        rank = match word {
+            word if is(&GYRO, word) => 0,
+            word if is(&SENSOR, word) => rank.min(1),
+            _ => return None,
+        };
+    }
     Some((rank, unit))
 }
 

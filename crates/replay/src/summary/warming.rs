@@ -47,6 +47,8 @@ pub struct WarmingLine {
     pub middle: Vector3<f64>,
     /// Temperature there, degrees Celsius.
     pub at: f64,
+    /// Lowest and highest temperature of a bias that was learned, degrees Celsius.
+    pub ends: [f64; 2],
     /// Share of how the bias moved that the line explains, 0 to 1.
     pub explained: f64,
 }
@@ -94,9 +96,12 @@ impl Warming {
     /// The line of least squares, where temperatures differ enough.
     #[must_use]
     pub fn line(&self) -> Option<WarmingLine> {
-        let span = self.pairs.iter().map(|pair| pair.temperature);
-        let span = span.clone().fold(f64::MIN, f64::max) - span.fold(f64::MAX, f64::min);
-        if self.pairs.len() < LEAST_PAIRS || span < LEAST_SPAN {
+        let temperatures = self.pairs.iter().map(|pair| pair.temperature);
+        let ends = [
+            temperatures.clone().fold(f64::MAX, f64::min),
+            temperatures.fold(f64::MIN, f64::max),
+        ];
+        if self.pairs.len() < LEAST_PAIRS || ends[1] - ends[0] < LEAST_SPAN {
             return None;
         }
         let weights: f64 = self.pairs.iter().map(|pair| pair.weight).sum();
@@ -120,6 +125,7 @@ impl Warming {
             slope,
             middle,
             at,
+            ends,
             explained: if moved > 0.0 { 1.0 - left / moved } else { 0.0 },
         })
     }
