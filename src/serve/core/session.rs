@@ -104,6 +104,8 @@ pub struct Session {
     authorised: bool,
     /// Whether its pages are our own.
     is_own_page: bool,
+    /// Line of where the replay is, as it was told last in answer.
+    place: Option<Bytes>,
     opening: Opening,
     errors_in_a_row: u32,
     errors: Allowance,
@@ -146,8 +148,9 @@ impl Session {
             Side::ListenOnly { trusted } => (trusted || hub.token().is_none(), Opening::Over),
             Side::Source(_) => (true, Opening::Over),
         };
-        if let Some(place) = hub.place().filter(|_| authorised) {
-            client.outbox.reply(place);
+        let place = hub.place().filter(|_| authorised);
+        if let Some(place) = &place {
+            client.outbox.reply(place.clone());
         }
         let reading = hub.reading().clone();
         Session {
@@ -156,6 +159,7 @@ impl Session {
             has_ended: false,
             authorised,
             is_own_page: false,
+            place,
             opening,
             side,
             hub: hub.clone(),
@@ -327,9 +331,7 @@ impl Session {
                 match expected.judge(token, self.client.peer.address(), Instant::now()) {
                     Ok(()) => {
                         self.authorised = true;
-                        if let Some(place) = self.hub.place() {
-                            self.client.outbox.reply(place);
-                        }
+                        self.tell_place();
                     }
                     Err(denied) => {
                         count(&self.hub.counters.faults, 1);

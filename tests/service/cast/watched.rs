@@ -135,6 +135,35 @@ fn samples_of_a_simulation_can_be_asked_for_before_it_has_begun() {
 }
 
 #[test]
+fn who_watches_late_is_told_where_a_paused_replay_is_now() {
+    let playback = Arc::new(Playback::new("flight.mcap", Some(1.0), true));
+    let hub = Hub::new(Settings {
+        timeline: Some(playback.clone()),
+        ..Settings::default()
+    });
+    let mut session = Session::new(&Arc::new(hub.unwrap()), "page".to_owned(), true);
+    let places = |session: &mut Session, line: &[u8]| -> Vec<serde_json::Value> {
+        session.bytes(line, Nanos(0), &mut Scratch::default());
+        let mut parts = VecDeque::new();
+        session.client().outbox.take(usize::MAX, &mut parts);
+        parts
+            .iter()
+            .map(|part| serde_json::from_slice(part).unwrap())
+            .filter(|said: &serde_json::Value| said["class"] == "PLAYBACK")
+            .collect()
+    };
+    // Nothing was read when it was greeted, and nobody is told what is read before it watches.
+    assert!(places(&mut session, b"")[0]["start"].is_null());
+    let _ = playback.grant([Nanos(5_000_000_000)].into_iter());
+    let told = places(&mut session, b"{\"class\":\"WATCH\"}\n");
+    assert_eq!(told.len(), 1);
+    assert_eq!(told[0]["start"]["sec"], 5);
+    // Who knows it already is not told again.
+    let stop = places(&mut session, b"{\"class\":\"WATCH\",\"enable\":false}\n");
+    assert!(stop.is_empty(), "{stop:?}");
+}
+
+#[test]
 fn a_replay_takes_no_samples_and_says_so() {
     let process = paused(&format!("replay {LOG}"), &[TCP]);
     let mut client = Client::tcp(process.address(0));

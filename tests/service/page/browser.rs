@@ -224,8 +224,9 @@ impl Browser {
         while self.eval(&guarded) != true {
             assert!(
                 start.elapsed() < PATIENCE,
-                "waited in vain: {what}: {expression}; the page says: {}",
-                self.eval("document.body.innerText.slice(0, 600)")
+                "waited in vain: {what}: {expression}; the page says: {}; thrown: {:?}",
+                self.eval("document.body.innerText.slice(0, 600)"),
+                self.thrown()
             );
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -315,12 +316,18 @@ impl Browser {
     /// Asserts that no script threw, and nothing was refused by the policy.
     pub(crate) fn is_unharmed(&mut self) {
         assert_eq!(self.eval("window.__violations"), json!([]));
-        for event in &self.events {
-            let is_thrown = event["method"] == "Runtime.exceptionThrown";
-            let entry = &event["params"]["entry"];
-            let is_refused = entry["source"] == "security" || entry["source"] == "javascript";
-            assert!(!is_thrown && !is_refused, "{event}");
-        }
+        assert_eq!(self.thrown(), [&Value::Null; 0]);
+    }
+
+    /// Exceptions of the page, and what its rules refused.
+    fn thrown(&self) -> Vec<&Value> {
+        let is_harm = |event: &&Value| {
+            let source = &event["params"]["entry"]["source"];
+            event["method"] == "Runtime.exceptionThrown"
+                || source == "security"
+                || source == "javascript"
+        };
+        self.events.iter().filter(is_harm).collect()
     }
 }
 

@@ -190,15 +190,23 @@ impl Session {
         let answer = wire::watching(filter.as_ref(), &offered);
         self.client.outbox.reply(answer);
         self.hub.watch(&self.client, filter);
+        // What changed between the greeting and this was told to those who watched already.
+        if self.hub.place() != self.place {
+            self.tell_place();
+        }
+    }
+
+    /// Tells where the replay is, if there is one.
+    pub(super) fn tell_place(&mut self) {
+        self.place = self.hub.place();
+        if let Some(place) = &self.place {
+            self.client.outbox.reply(place.clone());
+        }
     }
 
     fn control(&mut self, action: Action, number: u64, line: &[u8]) {
         match self.hub.control(self.client.number, action) {
-            Ok(()) => {
-                if let Some(place) = self.hub.place() {
-                    self.client.outbox.reply(place);
-                }
-            }
+            Ok(()) => self.tell_place(),
             // Well said, if in vain: not held against it.
             Err(fault) => self.say(&fault.of(Kind::Request), number, line),
         }
