@@ -323,13 +323,17 @@ impl Hub {
         }
         .telling(self.clients.room_made.clone());
         let channels = read(&self.channels.by_number);
-        if let ClientProtocol::Foxglove { controls } = shape {
-            outbox.reply(self.server_info(controls));
+        let info = match shape {
+            ClientProtocol::Foxglove { controls } => Some((controls, self.server_info(controls))),
+            _ => None,
+        };
+        if let Some((controls, info)) = &info {
+            outbox.reply(info.clone());
             outbox.reply(foxglove::channels(
                 channels.values().flat_map(|c| c.topics()),
                 self.channels.frames.transforms != Transforms::None,
             ));
-            if let Some(place) = self.where_it_is().filter(|_| controls) {
+            if let Some(place) = self.where_it_is().filter(|_| *controls) {
                 outbox.reply(foxglove::playback_state(&place, false, ""));
             }
         }
@@ -344,6 +348,13 @@ impl Hub {
             complaints: Complaints::default(),
         });
         write(&self.clients.by_number).insert(client.number, client.clone());
+        // From here on it is told what changes; of what changed meanwhile it was not.
+        if let Some((controls, info)) = info {
+            let now = self.server_info(controls);
+            if now != info {
+                client.outbox.reply(now);
+            }
+        }
         client
     }
 

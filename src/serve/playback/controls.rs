@@ -38,6 +38,8 @@ pub enum Notice {
     Tick,
     /// Change of state.
     Changed,
+    /// Its first stamp is known.
+    Begun,
 }
 
 /// A replay that is served.
@@ -141,7 +143,7 @@ impl Playback {
         if state.start.is_none() {
             state.start = Some(first);
             state.end = state.length.map(|l| Nanos(first.0.saturating_add(l.0)));
-            notice = Notice::Changed;
+            notice = Notice::Begun;
         }
         loop {
             if state.stopped || state.restart {
@@ -166,7 +168,7 @@ impl Playback {
                 None => {}
             }
             if state.mode != Mode::Playing && !std::mem::take(&mut state.glimpse) {
-                if notice == Notice::Changed {
+                if notice != Notice::Nothing {
                     // Said before it waits; the same items are asked for again.
                     return (Grant::Show(0), notice);
                 }
@@ -439,7 +441,7 @@ mod tests {
         // That it waits, and where, is said first.
         assert_eq!(
             playback.grant(stamps(0, 9)),
-            (Grant::Show(0), Notice::Changed)
+            (Grant::Show(0), Notice::Begun)
         );
         assert_eq!(playback.position().unwrap().at, Some(Nanos(0)));
         playback

@@ -190,7 +190,7 @@ impl PlaybackServer {
             }
         }
         if self.playback.begin_anew() {
-            self.hub.began_anew();
+            self.hub.tell_viewers();
             self.hub.announce(false, None);
             Next::Again
         } else {
@@ -239,6 +239,9 @@ impl Audience for PlaybackServer {
         let of = |count, is_shown| Some(audience::Grant { count, is_shown });
         loop {
             let (grant, notice) = self.playback.grant((0..count).map(due));
+            if notice == Notice::Begun {
+                self.hub.tell_viewers();
+            }
             if notice != Notice::Nothing {
                 self.hub.announce(notice == Notice::Tick, None);
             }

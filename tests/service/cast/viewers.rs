@@ -8,7 +8,13 @@ use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::net::{SocketAddr, TcpStream};
 use std::process::Command;
+use std::sync::Arc;
+use strapd::pipeline::audience::Audience;
+use strapd::serve::playback::controls::Playback;
+use strapd::serve::playback::server::PlaybackServer;
 use strapd::sink::Transforms;
+use strapd::sink::address::Listen;
+use strapd_attitude::record::Nanos;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
@@ -415,6 +421,29 @@ fn a_token_is_asked_for_before_anything_is_said() {
         .unwrap_err()
         .to_string();
     assert!(refused.contains("401"), "{refused}");
+}
+
+#[test]
+fn a_viewer_that_comes_before_the_first_sample_can_control_once_it_is_there() {
+    let settings = listening(&[WS]);
+    let playback = Playback::new("flight.mcap", Some(1.0), true);
+    let server = Arc::new(PlaybackServer::start(settings, playback, true, false).unwrap());
+    let Some(Listen::WebSocket(address)) = server.addresses().first() else {
+        unreachable!()
+    };
+    let (mut viewer, _) = Viewer::connect(*address, "foxglove.sdk.v1");
+    assert_eq!(viewer.text("serverInfo")["capabilities"], json!(["time"]));
+    let run = server.clone();
+    let run = std::thread::spawn(move || {
+        run.length(2.0);
+        run.turn(1, &|_| Nanos(5_000_000_000)).is_none()
+    });
+    let info = viewer.text("serverInfo");
+    assert_eq!(info["capabilities"], json!(["time", "playbackControl"]));
+    assert_eq!(info["dataStartTime"], json!({"sec": 5, "nsec": 0}));
+    assert_eq!(info["dataEndTime"], json!({"sec": 7, "nsec": 0}));
+    server.playback().stop();
+    assert!(run.join().unwrap(), "it was stopped");
 }
 
 #[test]

@@ -99,8 +99,8 @@ impl Hub {
         self.simulation.timeline.as_ref()?.overview(part)
     }
 
-    /// The replay has begun anew, as another session.
-    pub fn began_anew(&self) {
+    /// The replay has begun, so that it can be controlled, or begun anew as another session: viewers are told.
+    pub fn tell_viewers(&self) {
         // Before the clients are locked: `control` locks the playback first, then them.
         let (plain, controlling) = (self.server_info(false), self.server_info(true));
         for client in read(&self.clients.by_number).values() {
