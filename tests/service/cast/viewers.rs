@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use std::net::{SocketAddr, TcpStream};
 use std::process::Command;
 use std::sync::Arc;
+use std::time::Instant;
 use strapd::pipeline::audience::Audience;
 use strapd::serve::playback::controls::Playback;
 use strapd::serve::playback::server::PlaybackServer;
@@ -49,9 +50,12 @@ impl Viewer {
     }
 
     fn next(&mut self) -> Message {
+        let began = Instant::now();
         loop {
             match self.socket.read().unwrap() {
-                Message::Ping(_) | Message::Pong(_) => {}
+                Message::Ping(_) | Message::Pong(_) => {
+                    assert!(began.elapsed() < PATIENCE, "it does not come");
+                }
                 message => return message,
             }
         }
