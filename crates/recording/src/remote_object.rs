@@ -6,7 +6,6 @@
 //! an address is refused, with what helps.
 
 use crate::address::Address;
-use std::fmt::Debug;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -16,7 +15,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 pub const SCHEMES: [&str; 5] = ["http", "https", "s3", "gs", "az"];
 
 /// Bytes that are somewhere else. All calls may come from any thread, and wait.
-pub trait Object: Debug + Send + Sync {
+pub trait Object: Send + Sync {
     /// Number of bytes, for as long as this is read.
     fn size(&self) -> u64;
 
@@ -29,6 +28,13 @@ pub trait Object: Debug + Send + Sync {
     /// Says what will be read from now on, in this order, so that it is fetched before it is asked for, and at most
     /// `ahead` bytes before. What is read beside it is fetched by itself, and little more than that.
     fn expect(&self, ranges: Vec<Range<u64>>, ahead: u64);
+}
+
+// By its name: the vtable of every one of them would hold code that prints all its fields.
+impl std::fmt::Debug for dyn Object {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Object")
+    }
 }
 
 /// Object or listing at an address.
