@@ -86,12 +86,12 @@ pub fn run(global: &Global, args: &Relative) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
     let mut options = Options::default();
     args.tables.put(&mut options)?;
-    let read = |path: &Path, topic: &Option<String>| {
+    let read = |path: &Path, side: Side, topic: &Option<String>| {
         let input = opening::open(path)?;
-        attitude_track::read(&input, Side::Estimate, topic.as_deref(), &options, &pool)
+        attitude_track::read(&input, side, topic.as_deref(), &options, &pool)
     };
-    let first = read(&args.first, &args.topic)?;
-    let second = read(&args.second, &args.second_topic)?;
+    let first = read(&args.first, Side::Estimate, &args.topic)?;
+    let second = read(&args.second, Side::Second, &args.second_topic)?;
     for problem in first.problems.iter().chain(&second.problems) {
         tracing::warn!("{problem}");
     }

@@ -185,6 +185,7 @@ settings! {
     REF_TOPIC = "ref_topic";
     REGULARISE_STAMPS = "regularise_stamps";
     SAMPLE_KIND = "sample_kind";
+    SECOND_TOPIC = "second_topic";
     SENSOR_DELAY = "sensor_delay";
     SHARD = "shard";
     SMOOTH = "smooth";

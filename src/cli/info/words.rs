@@ -127,10 +127,7 @@ fn write_others(info: &Overview<'_>, out: &mut String) {
         .map(|force| force.topic.as_str())
         .collect();
     for known in others.iter().take(OTHERS) {
-        let what = match (
-            known.rank(),
-            known.role.has_orientation && known.messages > 0,
-        ) {
+        let what = match (known.rank(), known.has_attitudes()) {
             _ if forces.contains(known.channel.topic.as_str()) => {
                 "  (carries a specific force: --accel-topic takes it)"
             }

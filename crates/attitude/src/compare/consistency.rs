@@ -147,8 +147,8 @@ pub fn consistency<'r>(
         }
     }
     let sums = judge(align, &mut visit);
-    // Without any noise stated there is nothing to judge.
-    sums.is_stated.then_some(())?;
+    // Without any noise stated there is nothing to judge; nor by one orientation, to which the estimate was aligned.
+    (sums.is_stated && sums.samples > 1).then_some(())?;
     Some(Consistency {
         samples: sums.samples,
         tilt: sums.tilt.finish(sums.samples)?,

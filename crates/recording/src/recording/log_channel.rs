@@ -2,7 +2,8 @@
 
 use super::decoders::{Decoders, plain};
 use super::payload_type::PayloadType;
-use super::topics::Candidate;
+use super::static_transforms::is_mounting;
+use super::topics::{Candidate, PICKED_UNNAMED};
 use crate::decode::{Decoder, Rank, Role, Stated, Unsupported, role_of};
 use crate::mcap::Channel;
 use std::sync::Arc;
@@ -25,7 +26,7 @@ pub struct LogChannel {
     pub stated: Option<Stated>,
     /// Type of the samples of a text, with how its columns are read.
     pub(super) read_as: Option<PayloadType>,
-    /// Whether these are the attitudes of a sensor of a text whose samples are another channel.
+    /// Whether these are attitudes that strapd made: its rates are another channel's, less the bias.
     pub is_derived: bool,
     /// Name of the columns that tell it from other sensors of its table.
     pub(super) sensor_column: Option<String>,
@@ -53,19 +54,32 @@ impl LogChannel {
         of_text.unwrap_or_else(|| described(&self.channel))
     }
 
-    /// The [`rank`] of its role: 0 for a channel without a message, whatever its type.
+    /// The [`rank`] of its role: 0 for a channel without a message, whatever its type, and behind every recorded sensor
+    /// what strapd made of one.
     #[must_use]
     pub fn rank(&self) -> u8 {
-        match self.messages {
-            0 => 0,
-            _ => rank(&self.role),
+        match (self.messages, rank(&self.role)) {
+            (0, _) => 0,
+            (_, rank) if self.is_derived => rank.min(PICKED_UNNAMED),
+            (_, rank) => rank,
         }
+    }
+
+    /// Whether it carries attitudes of something that moves: how the frames of a robot lie in each other is none.
+    #[must_use]
+    pub fn has_attitudes(&self) -> bool {
+        self.role.has_orientation && self.messages > 0 && !is_mounting(&self.channel.topic)
+    }
+
+    /// Whether a replay finds in it, by itself, what samples of `frame` are held against.
+    #[must_use]
+    pub fn is_reference_of(&self, frame: &str) -> bool {
+        rank(&self.role) <= 1 && self.has_attitudes() && !self.is_of_another_frame(frame)
     }
 
     /// Whether it carries transforms, and the first message names no frame `frame`: they are of another body, mounted
     /// to it nobody knows how. Of no name this is not known.
-    #[must_use]
-    pub fn is_of_another_frame(&self, frame: &str) -> bool {
+    fn is_of_another_frame(&self, frame: &str) -> bool {
         let schema = self.channel.schema.as_deref().map_or("", |s| &s.name);
         let is_transform = ["TFMessage", "FrameTransform", "FrameTransforms"]
             .iter()

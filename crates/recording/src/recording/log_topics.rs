@@ -12,7 +12,7 @@ use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
 use crate::decode::Unsupported;
 use crate::error::{Error, Result};
 use crate::text::printable;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 
@@ -78,31 +78,6 @@ impl Recording {
     /// Candidates for the choice of topics: one for each source.
     #[must_use]
     pub fn candidates(&self) -> Vec<Candidate> {
-        let provenance = self.survey.facts.provenance.iter();
-        let outputs: BTreeSet<&str> = provenance
-            .filter(|(key, _)| *key == "output_topic" || key.ends_with(" output_topic"))
-            .map(|(_, topic)| topic.as_str())
-            .collect();
-        let inputs: BTreeSet<&str> = self
-            .channels
-            .iter()
-            .filter(|k| k.role.has_rate)
-            .filter_map(|k| k.channel.topic.strip_suffix("/data_raw"))
-            .collect();
-        // What a run put out, by its metadata or by its name beside the input's: its rates are another
-        // channel's, less the bias.
-        let is_our_attitude = |known: &LogChannel| {
-            let topic = known.channel.topic.as_str();
-            known.channel.metadata.contains_key("rotates")
-                || outputs.contains(topic)
-                || topic
-                    .strip_suffix("/data")
-                    .is_some_and(|name| inputs.contains(name))
-        };
-        let rank_of = |known: &LogChannel| match known.rank() {
-            best if is_our_attitude(known) => best.min(PICKED_UNNAMED),
-            best => best,
-        };
         let mut users: BTreeMap<usize, usize> = BTreeMap::new();
         for channel in self.sources.iter().flat_map(|s| &s.channels) {
             *users.entry(*channel).or_default() += 1;
@@ -110,17 +85,12 @@ impl Recording {
         let is_shared = |channel: &usize| users.get(channel).is_some_and(|n| *n > 1);
         self.sources
             .iter()
-            .map(|s| self.candidate(s, s.channels.iter().any(is_shared), &rank_of))
+            .map(|s| self.candidate(s, s.channels.iter().any(is_shared)))
             .collect()
     }
 
     /// `is_shared`: another source has messages on its channels.
-    fn candidate(
-        &self,
-        source: &Publisher,
-        is_shared: bool,
-        rank_of: &dyn Fn(&LogChannel) -> u8,
-    ) -> Candidate {
+    fn candidate(&self, source: &Publisher, is_shared: bool) -> Candidate {
         let first = self.channels_of(source).next();
         let mut said = first.map_or_else(String::new, |k| described(&k.channel).to_string());
         if !source.label.is_empty() {
@@ -140,7 +110,11 @@ impl Recording {
             described: said,
             // How many of a channel's messages are whose is known at the end.
             messages: (!is_shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
-            rank: self.channels_of(source).map(rank_of).max().unwrap_or(0),
+            rank: self
+                .channels_of(source)
+                .map(LogChannel::rank)
+                .max()
+                .unwrap_or(0),
             is_derived: first.is_some_and(|known| known.is_derived),
             sensor_column: first.and_then(|known| known.sensor_column.clone()),
         }

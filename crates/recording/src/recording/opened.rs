@@ -167,7 +167,7 @@ impl Recording {
                 .or_insert(first);
         }
         let mut decoders = Decoders::default();
-        let channels: Vec<LogChannel> = survey
+        let mut channels: Vec<LogChannel> = survey
             .channels
             .iter()
             .map(|found| {
@@ -177,6 +177,7 @@ impl Recording {
                 known(&found.channel, found.messages, first, &mut decoders)
             })
             .collect();
+        own_output::mark(&mut channels, &survey);
         Ok(Recording {
             problems: match problems(&survey) {
                 none if none.is_empty() => met,

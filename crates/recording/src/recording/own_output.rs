@@ -5,6 +5,7 @@
 //! and look like them: an IMU with rates. Those are the recording's, less the bias, and to integrate them again says
 //! less than the recording does.
 
+use super::log_channel::LogChannel;
 use crate::format::Format;
 use crate::lines::{HEAD_KEPT, Lines};
 use crate::mcap::{self, OURS, Reader, Survey, WalkOptions};
@@ -77,17 +78,44 @@ impl MadeBefore {
 
 /// Finds the same in metadata that name the topics it was written with, if there are no others.
 pub(super) fn in_survey(survey: &Survey) -> Option<MadeBefore> {
-    let said = &survey.facts.provenance;
-    let outputs: BTreeSet<&str> = said
-        .iter()
-        .filter(|(key, _)| *key == "output_topic" || key.ends_with(" output_topic"))
-        .map(|(_, topic)| topic.as_str())
-        .chain([TRANSFORMS])
-        .collect();
+    let outputs = outputs(survey);
+    let is_ours = |topic: &str| topic == TRANSFORMS || outputs.contains(topic);
     let mut topics = survey.channels.iter().map(|c| c.channel.topic.as_str());
-    (outputs.len() > 1 && topics.all(|topic| outputs.contains(topic))).then(|| MadeBefore {
-        of: said.get("input").filter(|name| !name.is_empty()).cloned(),
+    (!outputs.is_empty() && topics.all(is_ours)).then(|| MadeBefore {
+        of: survey
+            .facts
+            .provenance
+            .get("input")
+            .filter(|name| !name.is_empty())
+            .cloned(),
     })
+}
+
+/// Topics that a run put out, by its metadata.
+fn outputs(survey: &Survey) -> BTreeSet<&str> {
+    let said = survey.facts.provenance.iter();
+    said.filter(|(key, _)| *key == "output_topic" || key.ends_with(" output_topic"))
+        .map(|(_, topic)| topic.as_str())
+        .collect()
+}
+
+/// Marks what a run put out, by its metadata or by its name beside the input's.
+pub(super) fn mark(channels: &mut [LogChannel], survey: &Survey) {
+    let outputs = outputs(survey);
+    let inputs: BTreeSet<String> = channels
+        .iter()
+        .filter(|k| k.role.has_rate)
+        .filter_map(|k| k.channel.topic.strip_suffix("/data_raw"))
+        .map(str::to_owned)
+        .collect();
+    for known in channels {
+        let topic = known.channel.topic.as_str();
+        let is_beside = topic
+            .strip_suffix("/data")
+            .is_some_and(|name| inputs.contains(name));
+        known.is_derived =
+            known.channel.metadata.contains_key("rotates") || outputs.contains(topic) || is_beside;
+    }
 }
 
 /// The first bytes of a text are of attitudes.

@@ -19,6 +19,12 @@ pub const TF_STATIC: &str = "/tf_static";
 /// Most transforms that are kept: a robot has some hundred.
 const MOST: usize = 10_000;
 
+/// Whether a topic holds how frames lie in each other: that of a robot in a namespace of its own, too.
+#[must_use]
+pub fn is_mounting(topic: &str) -> bool {
+    topic.rsplit('/').next() == Some(plain(TF_STATIC))
+}
+
 /// Returns a name without the slash that ROS 1 had before it.
 fn plain(name: &str) -> &str {
     name.trim_start_matches('/')
@@ -59,6 +65,20 @@ impl StaticTransforms {
         Ok(all)
     }
 
+    /// Frame at the root of the tree that `frame` hangs in; `None` where it has no parent.
+    #[must_use]
+    pub fn root_of(&self, frame: &str) -> Option<&str> {
+        let mut at = self.0.get(plain(frame))?.0.as_str();
+        // Of a ring every frame is as good as any.
+        for _ in 0..self.0.len() {
+            match self.0.get(at) {
+                Some((parent, _)) => at = parent,
+                None => break,
+            }
+        }
+        Some(at)
+    }
+
     fn take(&mut self, reader: &mut MessageReader<'_>) -> Option<()> {
         for _ in 0..reader.word()? {
             let (parent, child, wxyz) = transform(reader)?;
@@ -97,15 +117,14 @@ impl StaticTransforms {
         }
         let names: BTreeSet<&str> = beside.keys().copied().collect();
         let names: Vec<&str> = names.into_iter().collect();
-        Err(Diagnostic::new(format!(
-            "{TF_STATIC} does not say how {} lies in {}; it holds {}",
-            snippet(frame.as_bytes()),
-            snippet(base.as_bytes()),
-            match names.as_slice() {
-                [] => "nothing".to_owned(),
-                _ => named_few(&names),
-            }
-        )))
+        let (frame, base) = (snippet(frame.as_bytes()), snippet(base.as_bytes()));
+        Err(Diagnostic::new(match names.as_slice() {
+            [] => format!("there is no {TF_STATIC} that says how {frame} lies in {base}"),
+            _ => format!(
+                "{TF_STATIC} does not say how {frame} lies in {base}; it holds {}",
+                named_few(&names)
+            ),
+        }))
     }
 }
 

@@ -14,12 +14,12 @@ use strapd_attitude::estimate::orientation_convention;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, Nanos, RawSample};
-use strapd_attitude::setting::{REF_TOPIC, TOPIC};
+use strapd_attitude::setting::{REF_TOPIC, SECOND_TOPIC, TOPIC};
 use strapd_attitude::worlds::{Convention, World};
 use strapd_recording::Input;
 use strapd_recording::Recording;
 use strapd_recording::attitude_line::{Attitude, sensor_of_truth};
-use strapd_recording::decode::{Options, Role};
+use strapd_recording::decode::Options;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
@@ -28,6 +28,7 @@ use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, rank};
 use strapd_recording::recording::opened::{AHEAD, problems};
 use strapd_recording::recording::sources::is_same;
+use strapd_recording::recording::static_transforms::is_mounting;
 use strapd_recording::recording::topics;
 use strapd_recording::text::printable;
 
@@ -55,6 +56,8 @@ pub struct Track {
 pub enum Side {
     /// The attitude under test.
     Estimate,
+    /// Attitude of the other of two bodies, under test as the first.
+    Second,
     /// Reference of the comparison.
     Reference,
 }
@@ -236,7 +239,7 @@ fn attitude_channel<'l>(
         .channels
         .iter()
         .filter(|k| k.role.has_orientation && carries_orientation(k, &mut decoders))
-        .map(|k| (goodness(&k.role, side, &k.channel.topic), k))
+        .map(|k| (goodness(k, side), k))
         .collect();
     all.sort_by_key(|(goodness, _)| std::cmp::Reverse(*goodness));
     match all.as_slice() {
@@ -255,22 +258,32 @@ fn attitude_channel<'l>(
         several => {
             let list: Vec<_> = several.iter().map(|(_, k)| k.candidate()).collect();
             let list = topics::listing(&list);
-            let what = Diagnostic::new(format!("several topics carry an attitude:{list}"))
-                .help(format!("{TOPIC} NAME (or {REF_TOPIC} NAME) takes one"));
+            let what = Diagnostic::new(format!("several topics carry an attitude:{list}")).help(
+                match side {
+                    Side::Reference => format!("{REF_TOPIC} NAME takes one"),
+                    Side::Estimate => format!("{TOPIC} NAME takes one"),
+                    Side::Second => format!("{SECOND_TOPIC} NAME takes one"),
+                },
+            );
             Err(Error::unsupported(path, what))
         }
     }
 }
 
-/// The truth, for a reference, before all; an orientation of its own topic before one in an Imu, before poses of
-/// other things and `/tf`.
-fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
-    match rank(role) {
+/// The truth, for a reference, before all, and for an estimate what strapd made; an orientation of its own topic before
+/// one in an Imu, before poses of other things and `/tf`.
+fn goodness(known: &LogChannel, side: Side) -> u8 {
+    let topic = known.channel.topic.as_str();
+    match rank(&known.role) {
         _ if topic == TRUTH_TOPIC => match side {
             Side::Reference => 4,
-            Side::Estimate => 0,
+            Side::Estimate | Side::Second => 0,
         },
-        _ if topic.trim_start_matches('/') == "tf" || topic.ends_with("tf_static") => 0,
+        _ if known.is_derived => match side {
+            Side::Reference => 1,
+            Side::Estimate | Side::Second => 4,
+        },
+        _ if topic.trim_start_matches('/') == "tf" || is_mounting(topic) => 0,
         0 => 3,
         1 => 1,
         _ => 2,

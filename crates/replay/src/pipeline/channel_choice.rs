@@ -19,7 +19,7 @@ use strapd_recording::mcap::Channel;
 use strapd_recording::recording::beside::{self, AuxiliaryInputs, OwnMessages};
 use strapd_recording::recording::channel_route::{PayloadNotes, Route, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
-use strapd_recording::recording::log_channel::{LogChannel, rank};
+use strapd_recording::recording::log_channel::LogChannel;
 use strapd_recording::recording::sources::{Publisher, is_same};
 use strapd_recording::recording::topic_plan::{self, TopicPlan};
 use strapd_recording::recording::topics;
@@ -216,14 +216,11 @@ pub(super) fn reference(
         .collect();
     let taken = |k: &&LogChannel| names.contains(k.channel.topic.as_str());
     let found = if asked.is_empty() {
-        let is_other_body = |k: &LogChannel| {
+        let is_of_one = |k: &LogChannel| {
             let mut frames = chosen.iter().map(|c| c.stream.frame_id.as_str());
-            frames.all(|frame| k.is_of_another_frame(frame))
+            frames.any(|frame| k.is_reference_of(frame))
         };
-        let mut others = log.channels.iter().filter(|k| {
-            let is_orientation = k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0;
-            !taken(k) && is_orientation && !is_other_body(k)
-        });
+        let mut others = log.channels.iter().filter(|k| !taken(k) && is_of_one(k));
         match (others.next(), others.next()) {
             // An odometry's or a camera's pose beside an IMU that has its own is another matter.
             (Some(one), None) if !one.role.has_rate => one,

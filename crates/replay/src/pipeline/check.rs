@@ -19,6 +19,7 @@ use strapd_recording::Recording;
 use strapd_recording::Selection;
 use strapd_recording::decode;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::log_channel::LogChannel;
 use strapd_recording::recording::opened::problems;
 
 /// Series that a report wants of the replays beside their summaries.
@@ -118,10 +119,7 @@ fn examine_by(
     are_there(&log, named.into_iter().chain(reference))?;
     let looks = look_as(&log, named, (&asked.selection.decode, &asked.plan), pool)?;
     let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
-        || log
-            .channels
-            .iter()
-            .any(|k| k.role.has_orientation && k.messages > 0);
+        || log.channels.iter().any(LogChannel::has_attitudes);
     let no_topic = match looks.topics.is_empty() {
         true => log.choose(path, None).err().as_ref().map(no_topic),
         false => None,

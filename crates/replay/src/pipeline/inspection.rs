@@ -22,7 +22,7 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::beside::Vectors;
 use strapd_recording::recording::channel_route::{Item, PayloadNotes, RouteTarget};
 use strapd_recording::recording::decoders::Decoders;
-use strapd_recording::recording::log_channel::{LogChannel, described, rank};
+use strapd_recording::recording::log_channel::{LogChannel, described};
 use strapd_recording::recording::opened::AHEAD;
 use strapd_recording::recording::payload_type::PayloadType;
 use strapd_recording::recording::sources::Publisher;
@@ -300,10 +300,10 @@ fn compare(topics: &mut [Inspection], log: &Recording) {
 
 /// Whether a replay that names none finds one topic of orientations beside the samples' own.
 fn has_reference_beside(log: &Recording, of: &str, frame: &str) -> bool {
-    let mut others = log.channels.iter().filter(|k| {
-        let is_orientation = k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0;
-        k.channel.topic != of && is_orientation && !k.is_of_another_frame(frame)
-    });
+    let mut others = log
+        .channels
+        .iter()
+        .filter(|k| k.channel.topic != of && k.is_reference_of(frame));
     matches!((others.next(), others.next()), (Some(one), None) if !one.role.has_rate)
 }
 

@@ -11,7 +11,7 @@ use super::session_builder::begin;
 use super::summarise;
 use super::{mend, opening, replay_stream};
 use crate::error::{Error, Result};
-use crate::sink::Flow;
+use crate::sink::{Flow, Transforms};
 use crate::summary::{RunSummary, human_bytes};
 use std::io::Read;
 use std::ops::ControlFlow;
@@ -32,6 +32,8 @@ use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::incoming::{Incoming, incoming};
 use strapd_recording::recording::input::is_pipe;
 use strapd_recording::recording::opened::{A_LITTLE_AHEAD, AHEAD};
+use strapd_recording::recording::static_transforms::{StaticTransforms, TF_STATIC, is_mounting};
+use strapd_recording::text::printable;
 
 /// Does it. `watch` is told where it is, often.
 ///
@@ -158,6 +160,7 @@ fn file(
     }
     let reference = reference_of(run, path, &log, &chosen)?;
     let besides = besides(run, path, &log, &mut chosen)?;
+    warn_of_second_parents(run, &log, &mut chosen, pool)?;
     let prepared = prepare(run, &log, (&chosen, &besides), pool)?
         .into_iter()
         .collect::<Result<Vec<Prepared>>>()?;
@@ -212,6 +215,34 @@ fn reference_of(
         }
         asked => reference(run, path, log, chosen, (asked, false)),
     }
+}
+
+/// Warns where the sensor's frame has a parent in the recording that is copied, and the world would be a second one.
+fn warn_of_second_parents(
+    run: &ReplayRequest,
+    log: &Recording,
+    chosen: &mut [RunTopic<'_>],
+    pool: &Pool,
+) -> Result<()> {
+    let is_one_tree = run.copy_input && run.frames.transforms == Transforms::Forward;
+    let has_mountings = log.channels.iter().any(|k| is_mounting(&k.channel.topic));
+    if !is_one_tree || run.frames.body.is_some() || !has_mountings {
+        return Ok(());
+    }
+    let tree = StaticTransforms::of(log, pool)?;
+    for topic in chosen {
+        let frame = &topic.stream.frame_id;
+        if let Some(root) = tree.root_of(frame) {
+            let (frame, root) = (printable(frame), printable(root));
+            topic.found.warnings.push(
+                Diagnostic::new(format!(
+                    "{frame} hangs on {root} by {TF_STATIC}, and a frame has one parent: the transform from the world tears that tree"
+                ))
+                .help(format!("--base-frame {root} gives the attitude of {root}; --tf reverse or none")),
+            );
+        }
+    }
+    Ok(())
 }
 
 fn log_passed_over(path: &Path, survey: &Survey) {
