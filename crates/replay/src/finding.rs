@@ -11,8 +11,13 @@ pub(crate) const MIXED: &str = "two-sensors";
 pub(crate) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
 pub(crate) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
 pub(crate) const GYRO_AXES_CHANGE: &str = "gyro-axes-change";
+/// Code of a gyro that reads nothing where gravity turns.
+pub(crate) const GYRO_DEAD: &str = "gyro-dead";
+/// Code of what a stage said of how it read or prepared the data, and has no name of its own.
+pub(crate) const AS_READ: &str = "preparation";
 /// Codes of a sensor that is read in wrong axes, by a wrong factor or in a wrong unit: the data show the right one.
-const MISREAD: [&str; 6] = [
+const MISREAD: [&str; 7] = [
+    GYRO_DEAD,
     "gyro-axes",
     "gyro-scale",
     "gyro-turned",

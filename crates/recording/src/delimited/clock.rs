@@ -11,6 +11,9 @@ use strapd_attitude::record::Nanos;
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;
 
+/// Nanoseconds of a tick of Windows and .NET.
+const TICK: i64 = 100;
+
 /// Clock by which the rows of a table are placed in time.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) enum Clock {
@@ -20,6 +23,8 @@ pub(super) enum Clock {
     Counts { nanos: f64, wraps: Option<Wraps> },
     /// A column of days and their parts since so many days before 1970.
     Days { origin: i64 },
+    /// A column of ticks of 100 ns, of which 1970 is this one.
+    Ticks { origin: i64 },
     /// A column of dates (RFC 3339).
     Dates,
     /// A column of times of day.
@@ -101,6 +106,9 @@ impl Clock {
                         .ok_or("is no number"),
                 }
             }
+            Clock::Ticks { origin } => whole()
+                .map(|count| Nanos(count.saturating_sub(*origin).saturating_mul(TICK)))
+                .ok_or("is no whole number"),
             Clock::Days { origin } => days(number, *origin).ok_or("is no number of days"),
             Clock::Dates => instant_of_date(number).ok_or("is no date (RFC 3339)"),
             Clock::Daily(daily) => daily.read(number).ok_or("is no time of day"),
@@ -184,6 +192,18 @@ fn scaled(count: f64, nanos: f64) -> Nanos {
     Nanos((count * nanos).round() as i64)
 }
 
+/// Tick that 1970 is where this one is of our time: of Windows' FILETIME (since 1601) and of .NET (since year 1). As
+/// nanoseconds the same numbers are of 1974 and 1990.
+pub(super) fn ticks_origin(count: i64) -> Option<i64> {
+    let is_of_our_time = |origin: &i64| {
+        let nanos = count.checked_sub(*origin)?.checked_mul(TICK)?;
+        Some(OUR_TIME.contains(&i128::from(nanos)))
+    };
+    [116_444_736_000_000_000, 621_355_968_000_000_000]
+        .into_iter()
+        .find(|origin| is_of_our_time(origin) == Some(true))
+}
+
 /// Days before 1970 at which a count begins by which this is a date of our time.
 pub(super) fn origin_of(days: f64) -> Option<i64> {
     let (from, to) = (OUR_TIME.start as f64, OUR_TIME.end as f64);
@@ -232,6 +252,24 @@ mod tests {
         );
         assert_eq!(read("1"), 65_537, "a row out of order");
         assert!(clock.read("1.5").is_err() && clock.read("").is_err());
+    }
+
+    #[test]
+    fn ticks_of_windows_and_of_dot_net_are_of_our_time_and_nanoseconds_are_none() {
+        // 2023-11-14T22:13:20Z.
+        for count in [133_444_736_000_000_000, 638_355_968_000_000_000] {
+            let origin = ticks_origin(count).unwrap();
+            let read = Clock::Ticks { origin }.read(&(count + 1).to_string());
+            assert_eq!(read, Ok(Nanos(1_700_000_000_000_000_100)));
+        }
+        for count in [
+            0,
+            1_700_000_000_000_000_000,
+            900_000_000_000_000_000,
+            i64::MIN,
+        ] {
+            assert_eq!(ticks_origin(count), None);
+        }
     }
 
     #[test]

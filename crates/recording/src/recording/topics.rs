@@ -124,10 +124,11 @@ fn the_best(path: &Path, candidates: &[Candidate], best: u8) -> Result<Choice> {
     others.retain(|name| !is_own(name));
     let note = (!others.is_empty()).then(|| {
         Diagnostic::new(format!(
-            "took {}; {} could be taken too with {TOPIC}",
+            "took {}; {} could be taken too",
             named_few(&topics),
             named_few(&others)
         ))
+        .help(format!("{TOPIC} NAME"))
     });
     Ok(Choice { topics, note })
 }

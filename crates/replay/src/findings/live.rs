@@ -6,7 +6,7 @@
 use super::samples::{self, Seen};
 use super::{Finding, Severity, axes, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
-use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_UNIT_CHANGE, MIXED};
+use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_DEAD, GYRO_UNIT_CHANGE, MIXED};
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::{Clock, ClockSpeed, GyroUnit, SpeedPass};
@@ -16,7 +16,8 @@ use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 18] = [
+const LASTING: [&str; 19] = [
+    GYRO_DEAD,
     "gyro-axes",
     "gyro-scale",
     "gyro-turned",
@@ -37,7 +38,8 @@ const LASTING: [&str; 18] = [
     GYRO_AXES_CHANGE,
 ];
 /// Codes of those about gyro and gravity.
-const OF_GYRO: [&str; 4] = [
+const OF_GYRO: [&str; 5] = [
+    GYRO_DEAD,
     "gyro-axes",
     "gyro-scale",
     "gyro-turned",

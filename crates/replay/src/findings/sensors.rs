@@ -5,6 +5,7 @@
 
 use super::samples::COUNTS;
 use super::{Finding, Severity, axes};
+use crate::finding::GYRO_DEAD;
 use crate::summary::significant;
 use nalgebra::Matrix3;
 use strapd_attitude::condition::GyroUnit;
@@ -65,6 +66,15 @@ pub(super) fn disagreement(
             (factor, sigma),
             (plan, resolved.unit),
         ),
+        Cause::Unturned => Finding::new(
+            Severity::Error,
+            GYRO_DEAD,
+            format!(
+                "gravity wanders by {} g, and the gyro reads next to nothing all the while",
+                significant(found.recorded, 2)
+            ),
+        )
+        .advise("the gyro is not there or does not answer, or its columns are others: the attitude is the accelerometer's"),
         Cause::Unknown => Finding::new(
             Severity::Warning,
             "gyro-against-gravity",

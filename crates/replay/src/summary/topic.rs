@@ -16,7 +16,7 @@ use super::smoothing::Smoothing;
 use super::stamps::Regularised;
 use super::warming::Warming;
 use super::{meaning, significant};
-use crate::finding::{Finding, Severity};
+use crate::finding::{AS_READ, Finding, Severity};
 use serde_json::{Map, Value, json};
 use strapd_attitude::condition::{ClockSet, Wraps};
 use strapd_attitude::diagnostic::Diagnostic;
@@ -591,11 +591,7 @@ fn sensor_maps(plan: &EstimationSettings) -> Option<String> {
 
 /// Finding of something that the preparation, or a run, noticed.
 pub(crate) fn warning(said: &Diagnostic) -> Finding {
-    Finding::said(
-        Severity::Warning,
-        said.code().unwrap_or("preparation"),
-        said,
-    )
+    Finding::said(Severity::Warning, said.code().unwrap_or(AS_READ), said)
 }
 
 fn smoothed_json(smoothed: &Result<Smoothing, Diagnostic>) -> Value {

@@ -3,7 +3,7 @@
 //! The unit of a stamp is that of its name; else that in which the steps are those of a gyro; else, and that is said,
 //! that which its size suggests. Where name and steps contradict each other, neither is believed.
 
-use super::super::clock::{Clock, Wraps, origin_of};
+use super::super::clock::{Clock, Wraps, origin_of, ticks_origin};
 use super::super::time_of_day::{Daily, DateOrder, date_and_time, since_midnight};
 use super::is_number;
 use super::roles::{Roles, place};
@@ -307,6 +307,8 @@ impl Roles<'_> {
             }
         }
         let stamps: Vec<Bare> = numbers.iter().filter_map(|n| bare_of_text(n)).collect();
+        let ticks = numbers.first().and_then(|n| n.parse().ok());
+        let ticks = ticks.and_then(ticks_origin);
         if let (Some(tscale), "t") = (self.preamble.tscale, text) {
             let mut stamp = of(nearly_whole(tscale * 1e9));
             stamp.unit = stamp.unit.filter(|unit| unit.name().is_some());
@@ -314,6 +316,19 @@ impl Roles<'_> {
         }
         if is_fine {
             return self.fine(at, &stamps).map(wrapping);
+        }
+        if stated.is_none()
+            && let Some(origin) = ticks
+        {
+            return Ok(Stamp {
+                clock: Clock::Ticks { origin },
+                unit: None,
+                note: Some(format!(
+                    "the stamps in `{text}` are taken for ticks of 100 ns as Windows or .NET counts them: {COLUMNS} stamp={}:ns says otherwise",
+                    self.reference(at)
+                )),
+                ..of(1.0)
+            });
         }
         match stated {
             Some(Ok(Unit::Time(nanos))) => {

@@ -1,7 +1,7 @@
 //! A topic's summary -> the few lines of it that everybody reads: what was done, and how good it is. Pure.
 
 use super::{NO_SIGMA, TopicSummary};
-use crate::finding::Severity;
+use crate::finding::{AS_READ, Finding, Severity};
 use crate::summary::against::against_text;
 use crate::summary::significant;
 
@@ -10,8 +10,12 @@ const LONGEST: usize = 160;
 
 /// `text`, cut at the end of a word.
 fn cut(text: &str) -> String {
+    cut_to(text, LONGEST)
+}
+
+fn cut_to(text: &str, longest: usize) -> String {
     let text = text.lines().next().unwrap_or_default();
-    match text.char_indices().nth(LONGEST) {
+    match text.char_indices().nth(longest) {
         None => text.to_owned(),
         Some((at, _)) => {
             let head = text.get(..at).unwrap_or_default();
@@ -19,6 +23,17 @@ fn cut(text: &str) -> String {
             format!("{} ...", head.get(..end).unwrap_or_default())
         }
     }
+}
+
+/// A finding in one line: where it is too long its words are cut, and what helps is kept.
+fn cut_before_advice(finding: &Finding) -> String {
+    let line = finding.line();
+    let advice = line.strip_prefix(&finding.what).unwrap_or_default();
+    let (long, advised) = (line.chars().count(), advice.chars().count());
+    if long <= LONGEST || advised == 0 || advised > LONGEST / 2 {
+        return cut(&line);
+    }
+    format!("{}{advice}", cut_to(&finding.what, LONGEST - advised))
 }
 
 impl TopicSummary {
@@ -94,27 +109,23 @@ impl TopicSummary {
 
     /// The worst of the warnings, and how many more there are.
     fn brief_warning(&self) -> Option<String> {
-        let worst = self
-            .findings
-            .iter()
-            .max_by_key(|finding| finding.severity)?;
-        let of = |severity| self.findings.iter().filter(move |f| f.severity == severity);
+        // What a rule found in the data comes before how they were read.
+        let rank = |finding: &&Finding| (finding.severity, finding.code != AS_READ);
         // The first of the worst.
-        let first = of(worst.severity).next().unwrap_or(worst);
+        let first = self.findings.iter().rev().max_by_key(rank)?;
         let more = self.findings.len() - 1;
         let more = match (more, first.severity) {
             (0, _) => String::new(),
             (n, Severity::Note) => format!(" (and {n} more notes)"),
             (n, _) => format!(" (and {n} more)"),
         };
-        Some(format!("{}{more}", cut(&first.line())))
+        Some(format!("{}{more}", cut_before_advice(first)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::finding::Finding;
     use strapd_attitude::record::Verdict;
 
     #[test]
@@ -131,6 +142,19 @@ mod tests {
         let lines = topic.brief(&[]);
         assert!(lines.len() <= 5, "{lines:?}");
         assert!(lines.contains(&("warning", "the worst (and 2 more)".to_owned())));
+        // What was said of the reading is not the worst of its kind, and what helps is not cut off.
+        let long = "word ".repeat(100);
+        topic.findings = vec![
+            Finding::new(Severity::Warning, AS_READ, "beside it"),
+            Finding::new(Severity::Warning, "code", long).advise("this helps"),
+            Finding::new(Severity::Warning, "code", "another"),
+        ];
+        let (_, said) = topic.brief(&[]).pop().unwrap();
+        assert!(
+            said.starts_with("word word ") && said.ends_with("word ...; this helps (and 2 more)"),
+            "{said}"
+        );
+        assert!(said.len() < LONGEST + 30);
         let whole = topic.rows(false).len();
         assert!(whole > lines.len());
     }
