@@ -97,6 +97,8 @@ const PRIMING: usize = 32;
 const COARSE_PRIMING: usize = 1 << 15;
 /// A stamp of zero is taken for a stamp only where the clock is within this of zero.
 const ZERO_IS_CLOSE_NANOS: i64 = 10_000_000_000;
+/// Most samples with a stamp of zero that wait: those of a second at 1 kHz, where the clock counts seconds.
+const MOST_ZEROS: usize = 1000;
 
 /// One stream's conditioning: push blocks, cut anywhere, and finish.
 ///
@@ -131,8 +133,8 @@ pub struct Conditioner {
     mixture: MixtureWatch,
     units: UnitWatch,
     is_rate: bool,
-    /// A first sample with stamp zero, until the second tells whether that can be.
-    zero: Option<(RawSample, u64)>,
+    /// First samples with stamp zero, until another stamp tells whether that can be.
+    zeros: Vec<(RawSample, u64)>,
     state: State,
     report: Report,
 }
@@ -219,7 +221,7 @@ impl Conditioner {
             is_compared: settings.repair == StampRepair::Auto
                 && settings.has_arrival
                 && matches!(settings.clock, Clock::Header),
-            zero: None,
+            zeros: Vec::new(),
             state: State {
                 rails: (is_rate && window == 0 && settings.gyro_range.is_none()).then(Rails::new),
                 ..State::default()
@@ -254,7 +256,7 @@ impl Conditioner {
 
     /// The stream has ended: appends what was held back. Later samples continue it.
     pub fn finish(&mut self, out: &mut Vec<RateSample>) {
-        if let Some((_, index)) = self.zero.take() {
+        for (_, index) in std::mem::take(&mut self.zeros) {
             self.report.note(Verdict::NoStamp, index, Some(Nanos(0)));
         }
         self.order.finish(self.timing.spacing(), &mut self.report);
@@ -312,7 +314,7 @@ impl Conditioner {
                 if stamp.0.unsigned_abs() > MAX_STAMP as u64 {
                     return self.reject(Verdict::FarStamp, index, Some(stamp));
                 }
-                if (stamp.0 == 0 || self.zero.is_some())
+                if (stamp.0 == 0 || !self.zeros.is_empty())
                     && self.index_clock.is_none()
                     && self.is_zero_in_doubt(raw, stamp, index, out)
                 {
@@ -363,8 +365,8 @@ impl Conditioner {
         }
     }
 
-    /// A zero stamp is no stamp, unless the clock really begins there: the first sample with one
-    /// waits for the second. Says whether the sample has been dealt with.
+    /// A zero stamp is no stamp, unless the clock really begins there: the first samples with one wait for another
+    /// stamp, since a coarse clock says zero several times. Says whether the sample has been dealt with.
     #[cold]
     fn is_zero_in_doubt(
         &mut self,
@@ -374,7 +376,7 @@ impl Conditioner {
         out: &mut Vec<RateSample>,
     ) -> bool {
         if stamp.0 != 0 {
-            if let Some((zero, zero_index)) = self.zero.take() {
+            for (zero, zero_index) in std::mem::take(&mut self.zeros) {
                 if stamp.0.abs() <= ZERO_IS_CLOSE_NANOS {
                     self.pass(&zero, Nanos(0), zero_index, out);
                 } else {
@@ -385,7 +387,7 @@ impl Conditioner {
         }
         match self.order.high() {
             Some(high) if high.0.abs() <= ZERO_IS_CLOSE_NANOS => return false,
-            None if self.zero.is_none() => self.zero = Some((*raw, index)),
+            None if self.zeros.len() < MOST_ZEROS => self.zeros.push((*raw, index)),
             _ => self.reject(Verdict::NoStamp, index, Some(stamp)),
         }
         true

@@ -1,8 +1,9 @@
 //! Rates of one topic -> axes that froze while others moved. Pure.
 //!
 //! A stage of its own because it is counted along with the samples: an axis that hangs for a while and comes back shows in
-//! no mean. Frozen is what repeats one reading far longer than this axis ever does, while another axis moves; whole deg/s
-//! repeat themselves, too, and so does what reads about nothing. `docs/theory/consistency.md` has the numbers.
+//! no mean. Frozen is what repeats one reading far longer than this axis ever does, while another axis moves, and goes on
+//! with a leap; whole deg/s repeat themselves, too, where a smooth motion stays within one step, and so does what reads
+//! about nothing. `docs/theory/consistency.md` has the numbers.
 
 /// Fewest samples, and by the samples for which the axis usually repeats a reading.
 const LEAST: u64 = 25;
@@ -13,6 +14,12 @@ const DEAD: u64 = 100;
 const MOVES: f64 = 0.3;
 /// Changes of an axis after which its usual run is known.
 const KNOWN: u64 = 16;
+/// Steps of the axis that a frozen one leaps by when it comes back: a coarse one goes on by one.
+const LEAP: f64 = 4.0;
+/// One that never came back has hung for so many samples in which another axis moves, and for so many times the longest
+/// it had ever stayed within one step.
+const HANGS: u64 = 100;
+const TIMES_LONGEST: u64 = 4;
 /// Readings below so many of the axis's smallest steps are about nothing: a rotation about another axis gives them.
 const NOTHING: f64 = 4.0;
 
@@ -33,6 +40,8 @@ struct Axis {
     /// Samples in a row that repeat the last reading, and those of them in which another axis moved.
     run: u64,
     moved: u64,
+    /// The longest of them that ended with a small step.
+    longest: u64,
     quantum: f64,
     found: Option<FrozenAxis>,
 }
@@ -54,6 +63,7 @@ impl FrozenAxes {
             changes: 0,
             run: 0,
             moved: 0,
+            longest: 0,
             quantum: f64::INFINITY,
             found: None,
         };
@@ -93,6 +103,11 @@ impl Axis {
         self.samples += 1;
         if rate != self.last {
             let change = (rate - self.last).abs();
+            match change > LEAP * self.quantum {
+                true if self.is_frozen() => self.note(),
+                true => {}
+                false => self.longest = self.longest.max(self.run),
+            }
             if change > 0.0 {
                 self.quantum = self.quantum.min(change);
             }
@@ -102,20 +117,24 @@ impl Axis {
         }
         self.run += 1;
         self.moved += u64::from(other_moves);
-        if self.moved >= LEAST && self.is_frozen() {
-            let longest = self.found.map_or(0, |found| found.samples);
-            if self.run >= longest {
-                self.found = Some(FrozenAxis {
-                    reading: rate,
-                    samples: self.run + 1,
-                });
-            }
+        if self.moved >= HANGS && self.run > TIMES_LONGEST * self.longest && self.is_frozen() {
+            self.note();
+        }
+    }
+
+    fn note(&mut self) {
+        if self.run >= self.found.map_or(0, |found| found.samples) {
+            self.found = Some(FrozenAxis {
+                reading: self.last,
+                samples: self.run + 1,
+            });
         }
     }
 
     fn is_frozen(&self) -> bool {
         let usual = (self.samples - self.run) as f64 / self.changes.max(1) as f64;
         self.changes >= KNOWN
+            && self.moved >= LEAST
             && self.moved as f64 >= TIMES_USUAL * usual
             && self.last.abs() > NOTHING * self.quantum
     }
@@ -170,5 +189,25 @@ mod tests {
             table.push(&[x, 0.0, z]);
         }
         assert_eq!(table.found(), [None; 3]);
+    }
+
+    #[test]
+    fn a_smooth_motion_that_stays_within_a_coarse_step_is_not_frozen_and_one_that_never_comes_back_is()
+     {
+        let watch = |hangs_at: i32| {
+            let mut frozen = FrozenAxes::new(1.0);
+            for n in 0..6000 {
+                let t = f64::from(n) * 0.004;
+                // Up and down by the minute, with a crest of a second within one step of 1 deg/s.
+                let x = 0.4 * (1.1 * t).sin() + 0.35 * (0.37 * t).cos();
+                let at = if n >= hangs_at { 0.5 } else { x };
+                let rates = [at, (2.9 * t).cos(), 0.0];
+                frozen.push(&rates.map(|rate: f64| (rate * 57.3).round() / 57.3));
+            }
+            frozen.found()
+        };
+        assert_eq!(watch(6000), [None; 3]);
+        let [x, ..] = watch(4000);
+        assert!(x.is_some_and(|found| found.samples > 1900), "{x:?}");
     }
 }

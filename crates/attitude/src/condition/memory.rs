@@ -81,7 +81,7 @@ impl Conditioner {
         let (order, untimed) = (self.order.state(), self.order.untimed());
         let waiting = untimed.len().max(order.suspects.len());
         if (self.batch_line.is_some() && self.window > 0)
-            || self.zero.is_some()
+            || !self.zeros.is_empty()
             || !self.primed
             || waiting > MOST_WAITING
         {
@@ -120,7 +120,7 @@ impl Conditioner {
         self.state = memory.state.clone();
         // A file may be older than these.
         self.state.rails = rails.map(|fresh| memory.state.rails.unwrap_or(fresh));
-        self.zero = None;
+        self.zeros.clear();
         self.primed = true;
         self.hold = self.window;
         self.order

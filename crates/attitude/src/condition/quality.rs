@@ -139,6 +139,7 @@ pub struct Quality {
     /// The newest hole: between which stamps, and how many samples are still missing in it.
     hole: Option<(Nanos, Nanos, u64)>,
     last_row_lone_zero: bool,
+    was_fast: bool,
     axes: [Axis; 3],
     rails: Rails,
     broken: [BrokenAxes; 2],
@@ -187,6 +188,7 @@ impl Quality {
             longest_gap: 0,
             hole: None,
             last_row_lone_zero: false,
+            was_fast: false,
             axes: [Axis::EMPTY; 3],
             rails: Rails::new(),
             broken: [1.0, 1.0_f64.to_degrees()].map(BrokenAxes::new),
@@ -354,8 +356,10 @@ impl Quality {
             gyro == [0.0; 3] && self.previous.is_some_and(|previous| previous != [0.0; 3]);
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        self.so_far.fast_rows +=
-            u64::from((DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
+        // A motion goes on: a word for nothing (-999, 655.35) between readings is no rate.
+        let is_fast = (DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak);
+        self.so_far.fast_rows += u64::from(is_fast && self.was_fast && !held);
+        self.was_fast = is_fast;
         for (axis, v) in self.axes.iter_mut().zip(gyro) {
             axis.push(v);
         }
