@@ -26,7 +26,7 @@ mod segment;
 mod tests;
 
 pub use self::bank::CHIPS;
-use self::bank::{Answer, BANK, Evidence, Verdict};
+use self::bank::{Answer, BANK, DEGREE, Evidence, OF_UNIT, Verdict};
 use self::blocks::{Block, Blocks, Rest, Step};
 pub use self::change::AxesChange;
 use self::change::Sound;
@@ -48,7 +48,7 @@ const SLACK_NANOS: i64 = 1_000;
 const BIAS_FREE: f64 = 0.1;
 const BIAS_KNOWN: f64 = 0.01;
 /// Change of the running length of gravity with a block.
-const GRAVITY_STEP: f64 = 1.002;
+const GRAVITY_OF_UNIT: f64 = 1.002;
 /// The bank runs once this share of the last segments, of which there are so many, scatters by more than this, g.
 const GATE_SCATTER: f64 = 0.05;
 const GATE_SHARE: f64 = 0.4;
@@ -116,6 +116,8 @@ pub enum Cause {
         /// Largest standard deviation about an axis, rad.
         sigma: f64,
     },
+    /// Lack of rates: gravity turns, and the gyro reads next to nothing.
+    Unturned,
     /// Unknown, since no map explains it: the rates are wrong, or gravity stays with the body.
     Unknown,
 }
@@ -148,6 +150,9 @@ pub struct Consistency {
     bank: Option<Evidence>,
     held: usize,
     settled: Option<Verdict>,
+    /// Gravity that wanders though no map explains it, and how often in a row it was seen.
+    unexplained: Option<Verdict>,
+    unexplained_held: usize,
     /// Map that the bank has not, and how many segments the bank has judged.
     finer: Option<Finer>,
     judged: usize,
@@ -176,6 +181,8 @@ impl Default for Consistency {
             bank: None,
             held: 0,
             settled: None,
+            unexplained: None,
+            unexplained_held: 0,
             finer: None,
             judged: 0,
             sound: Sound::default(),
@@ -210,7 +217,7 @@ impl Consistency {
     }
 
     fn says_nothing(&self) -> bool {
-        self.settled.is_none() && self.finer.is_none()
+        self.settled.is_none() && self.finer.is_none() && self.unexplained.is_none()
     }
 
     /// Axes of the gyro that are others from one moment on; `None` where they are not, or too little motion on either
@@ -245,7 +252,8 @@ impl Consistency {
         if let Some(finer) = self.finer_at_the_end().or(self.finer) {
             return Some(finer.disagreement());
         }
-        let verdict = self.settled?;
+        let is_open = self.axes_change().is_none();
+        let verdict = self.settled.or(self.unexplained.filter(|_| is_open))?;
         let cause = match verdict.answer {
             Answer::Map(decided) => BANK
                 .get(verdict.hypothesis)
@@ -261,6 +269,14 @@ impl Consistency {
                     )
                 }),
             Answer::Factor => self.refined(&verdict),
+            Answer::Degrees => Some((
+                Cause::Scale {
+                    factor: DEGREE,
+                    sigma: OF_UNIT,
+                },
+                verdict.found,
+            )),
+            Answer::Unturned => Some((Cause::Unturned, verdict.found)),
             Answer::Contradiction => None,
         };
         let (cause, cured) = cause.unwrap_or((Cause::Unknown, verdict.found));
@@ -314,8 +330,8 @@ impl Consistency {
         let length = block.force.norm();
         let gravity = match self.gravity {
             None => length,
-            Some(gravity) if length > gravity => gravity * GRAVITY_STEP,
-            Some(gravity) => gravity / GRAVITY_STEP,
+            Some(gravity) if length > gravity => gravity * GRAVITY_OF_UNIT,
+            Some(gravity) => gravity / GRAVITY_OF_UNIT,
         };
         self.gravity = (gravity > 0.0).then_some(gravity);
         if self.gravity.is_none() {
@@ -397,6 +413,11 @@ impl Consistency {
         self.look_for_change();
         if self.held >= HOLD {
             self.settled = verdict;
+        }
+        let unexplained = self.bank.as_ref().and_then(Evidence::unexplained);
+        self.unexplained_held = unexplained.map_or(0, |_| self.unexplained_held + 1);
+        if self.unexplained_held >= HOLD {
+            self.unexplained = unexplained;
         }
         self.judged += 1;
         // The end of a recording judges all that is kept, which until then is all there was.

@@ -78,8 +78,9 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 24] = [
+const FAULTS: [Fault; 25] = [
     ("good", |_, _| {}, "", ""),
+    ("absent", |_, s| s.gyro = [0.0; 3], "gyro-dead", ""),
     (
         "reversed",
         |_, s| s.gyro[0] *= -1.0,

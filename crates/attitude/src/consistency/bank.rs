@@ -31,7 +31,9 @@ pub const CHIPS: [(f64, u32); 8] = [
 /// Factors that units and ranges make, beside the counts of chips: a hand turns ten rad in a segment, of which the 12 %
 /// between two powers leave nothing that stands still.
 const UNITS: [f64; 5] = [DEGREE, 1.0 / DEGREE, 1e-3, 0.5, 2.0];
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
+pub(super) const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// Sigma of a factor that is taken for a unit's, as a share: no factor near it is told apart from it.
+pub(super) const OF_UNIT: f64 = 0.04;
 /// Hypotheses in the bank.
 const HYPOTHESES: usize = MAPS + 51 + UNITS.len() + CHIPS.len();
 /// Least mean force of what stands still, g: rates of any other size turn gravity until nothing of it is left, and
@@ -62,11 +64,24 @@ const LARGEST_RATIO: f64 = 0.6;
 /// The same of what is moved about hard, whose own accelerations scatter: a map that has a peak stands out by more.
 const LARGEST_FOUND_SHAKEN: f64 = 0.15;
 const LARGEST_RATIO_SHAKEN: f64 = 0.4;
+/// Median scatter as recorded, g, that no body makes which is moved about: twice the most of 14 recordings of BROAD, 7
+/// others and simulated hands, drones, cars, boats, runners and circles (0.084). A gyro that reads nothing has 0.18 to 0.5.
+pub(super) const WANDERS: f64 = 0.17;
+/// Turn, rad, of a segment in which the gyro turned by next to nothing.
+const UNTURNED: f64 = 0.1;
 /// Least scatter of the identity, g; where physics makes gravity turn less than the body.
 const LEAST_IDENTITY: f64 = 0.05;
 pub(super) const LEAST_IDENTITY_LESS: f64 = 0.09;
 /// A factor below this is a unit.
 const UNIT_BELOW: f64 = 0.1;
+/// Rate as recorded, rad/s, that is beyond the range of nearly every gyro of three axes (2000 deg/s are 35 rad/s, 4000
+/// are 70): of a swing to and fro no rotation at all makes gravity stand still as well as the right unit does, and rates
+/// like these tell the two apart.
+const BEYOND: f64 = 40.0;
+/// Share of the segments that hold such rates.
+const BEYOND_SHARE: f64 = 0.5;
+/// Place of degrees in the bank, behind the powers.
+const DEGREES: usize = HYPOTHESES - UNITS.len() - CHIPS.len();
 
 /// A map from recorded to true rates.
 #[derive(Clone, Copy, Debug)]
@@ -140,6 +155,10 @@ pub(super) struct Row {
     of: Vec<f64>,
     /// Scatter as recorded, without that: what spins about itself has a force that is mostly no gravity.
     wanders: f64,
+    /// Whether it holds rates that hardly a gyro has.
+    is_beyond: bool,
+    /// Whether the gyro turned by next to nothing.
+    is_unturned: bool,
     /// Beginning and end of the segment.
     span: (Nanos, Nanos),
 }
@@ -210,6 +229,8 @@ impl Residuals {
         Row {
             of,
             wanders,
+            is_beyond: segment.fastest() > BEYOND,
+            is_unturned: segment.turned() < UNTURNED,
             span: segment.span,
         }
     }
@@ -222,6 +243,11 @@ pub(super) enum Answer {
     Map([bool; 3]),
     /// The true rates are about this factor of them.
     Factor,
+    /// The recorded rates are faster than a gyro's, and in deg/s gravity stands still; how still, no factor near it
+    /// changes.
+    Degrees,
+    /// The gyro reads no rotation where gravity turns.
+    Unturned,
     /// Lack of any map: no rotation at all makes gravity stand still as well.
     Contradiction,
 }
@@ -306,6 +332,29 @@ impl Evidence {
         self.verdict_from(0, &self.sums)
     }
 
+    /// Verdict about gravity that wanders as it does of no body that is moved about, where no map is clear.
+    pub(super) fn unexplained(&self) -> Option<Verdict> {
+        let wanders = median_scatter(self.rows.iter().map(|row| &row.wanders));
+        if self.rows.len() < LEAST_SEGMENTS || wanders < WANDERS {
+            return None;
+        }
+        let unturned = self.rows.iter().filter(|row| row.is_unturned).count() as f64;
+        let share = unturned / self.rows.len() as f64;
+        Some(Verdict {
+            answer: match share >= LEAST_SHARE {
+                true => Answer::Unturned,
+                false => Answer::Contradiction,
+            },
+            hypothesis: 0,
+            evidence: 0.0,
+            identity: wanders,
+            found: wanders,
+            recorded: wanders,
+            share,
+            segments: self.rows.len(),
+        })
+    }
+
     /// Verdict by the last segments alone, and their first, where a map explains those and not the ones before.
     pub(super) fn later(&self) -> Option<(usize, Verdict)> {
         let (mut cut, mut most) = (0, f64::NEG_INFINITY);
@@ -341,11 +390,14 @@ impl Evidence {
             return None;
         }
         let near = near(sums, best);
-        let chosen = simplest(sums, &near)?;
-        let telling: Vec<&Row> = self
-            .rows
-            .iter()
-            .skip(from)
+        let rows = || self.rows.iter().skip(from);
+        let beyond = rows().filter(|row| row.is_beyond).count() as f64;
+        let (simplest, nothing) = (simplest(sums, &near)?, sums[MAPS]);
+        let has_peak = sums[simplest] - nothing >= (0.15 * sums[simplest]).max(4.0);
+        let is_beyond = beyond >= BEYOND_SHARE * count as f64;
+        let is_in_degrees = !has_peak && is_beyond && near.contains(&DEGREES);
+        let chosen = if is_in_degrees { DEGREES } else { simplest };
+        let telling: Vec<&Row> = rows()
             .filter(|row| row.evidence(chosen).abs() > TELLING)
             .collect();
         if telling.len() < LEAST_SEGMENTS {
@@ -358,12 +410,13 @@ impl Evidence {
         let scatter_of = |h: usize| median_scatter(telling.iter().filter_map(|row| row.of.get(h)));
         let found = scatter_of(chosen);
         let share = agree as f64 / telling.len() as f64;
-        let (evidence, nothing) = (sums[chosen], sums[MAPS]);
-        let has_peak = evidence - nothing >= (0.15 * evidence).max(4.0);
+        let evidence = sums[chosen];
+        let has_peak = has_peak || is_in_degrees;
         let wanders = median_scatter(telling.iter().map(|row| &row.wanders));
         let identity = if has_peak { scatter_of(0) } else { wanders };
         let factor = BANK.get(chosen)?.factor;
         let least = match factor {
+            _ if is_in_degrees => 0.0,
             None => LEAST_IDENTITY,
             Some(factor) if factor > 1.0 || (factor < UNIT_BELOW && has_peak) => LEAST_IDENTITY,
             Some(_) => LEAST_IDENTITY_LESS,
@@ -376,6 +429,7 @@ impl Evidence {
             && identity >= least;
         is_clear.then(|| Verdict {
             answer: match (has_peak, factor) {
+                _ if is_in_degrees => Answer::Degrees,
                 (false, _) => Answer::Contradiction,
                 (true, Some(_)) => Answer::Factor,
                 (true, None) => decided(&near, chosen).map_or(Answer::Contradiction, Answer::Map),

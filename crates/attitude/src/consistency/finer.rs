@@ -157,8 +157,10 @@ fn explained(segments: &[&Segment], settled: &Verdict) -> Option<f64> {
     let of = segments.iter().copied();
     match settled.answer {
         Answer::Map(_) => Some(refine::<3>(of, &map, &[])?.left),
-        Answer::Factor => Some(refine::<4>(of, &map, &[Matrix3::identity()])?.left),
-        Answer::Contradiction => None,
+        Answer::Factor | Answer::Degrees => {
+            Some(refine::<4>(of, &map, &[Matrix3::identity()])?.left)
+        }
+        Answer::Unturned | Answer::Contradiction => None,
     }
 }
 

@@ -120,10 +120,20 @@ impl Segment {
 
     /// Whether the gyro turned, or the force changed, enough to say something.
     pub(super) fn moves(&self) -> bool {
-        let turned: f64 = self.pieces.iter().map(|piece| piece.angle.norm()).sum();
-        let scatter = self.force_scatter();
+        let (turned, scatter) = (self.turned(), self.force_scatter());
         let is_believed = turned < MOST && scatter * scatter < MOST;
         is_believed && (turned > LEAST_TURN || scatter > LEAST_SCATTER)
+    }
+
+    /// Sum of all it turned, rad in whatever unit.
+    pub(super) fn turned(&self) -> f64 {
+        self.pieces.iter().map(|piece| piece.angle.norm()).sum()
+    }
+
+    /// Largest mean rate of a block, rad/s as recorded.
+    pub(super) fn fastest(&self) -> f64 {
+        let pieces = self.pieces.iter();
+        pieces.fold(0.0, |most, piece| most.max(piece.angle.norm() / piece.secs))
     }
 
     /// Scatter of the means of the force in the body, g.

@@ -3,6 +3,7 @@
 
 mod simulation;
 
+use super::bank::WANDERS;
 use self::simulation::{Sample, roll_only, simulate};
 use super::*;
 use crate::propagate::shared_data;
@@ -134,7 +135,8 @@ fn the_bank_says_what_the_reference_says() {
         };
         let (kind, seen) = match verdict.answer {
             Answer::Map(decided) => ("map", decided),
-            Answer::Factor => ("factor", [false; 3]),
+            Answer::Factor | Answer::Degrees => ("factor", [false; 3]),
+            Answer::Unturned => ("none", [false; 3]),
             Answer::Contradiction => ("contradict", [false; 3]),
         };
         let seen = ["x", "y", "z"].into_iter().zip(seen).filter(|(_, is)| *is);
@@ -320,4 +322,47 @@ fn axes_that_change_half_way_are_named_with_the_moment_and_those_of_a_whole_stre
         let sound = watched(&samples, &identity);
         assert!(sound.agrees() && sound.axes_change().is_none());
     }
+}
+
+#[test]
+fn a_gyro_that_reads_nothing_where_gravity_turns_is_named_and_one_of_a_body_at_rest_is_not() {
+    let samples = simulate(3000, 2.0);
+    let absent = watched(&samples, &Matrix3::zeros()).disagreement().unwrap();
+    assert_eq!(absent.cause, Cause::Unturned);
+    assert!(absent.recorded > WANDERS, "{absent:?}");
+    let mut rest = Consistency::default();
+    for n in 0..3000 {
+        rest.push(&Reading {
+            stamp: Nanos(n * 20_000_000),
+            gyro: Measured::Rate(BodyRate(Vector3::zeros())),
+            force: Vector3::new(0.0, 0.0, 9.81),
+        });
+    }
+    assert_eq!(rest.disagreement(), None);
+}
+
+/// A leg that swings to and fro by 20 degrees, its rates times `factor`.
+fn swing(factor: f64) -> Consistency {
+    let mut consistency = Consistency::default();
+    for n in 0..6000 {
+        let t = n as f64 * 0.01;
+        let at = 2.0 * std::f64::consts::PI * 0.9;
+        let (pitch, rate) = (0.35 * (at * t).sin(), 0.35 * at * (at * t).cos());
+        consistency.push(&Reading {
+            stamp: Nanos(n * 10_000_000),
+            gyro: Measured::Rate(BodyRate(Vector3::new(0.0, rate * factor, 0.0))),
+            force: Vector3::new(-pitch.sin(), 0.0, pitch.cos()) * 9.81,
+        });
+    }
+    consistency
+}
+
+#[test]
+fn a_swing_in_degrees_is_told_by_rates_that_no_gyro_has() {
+    let found = swing(1.0 / DEGREE).disagreement().unwrap();
+    assert!(
+        matches!(found.cause, Cause::Scale { factor, .. } if factor == DEGREE),
+        "{found:?}"
+    );
+    assert_eq!(swing(1.0).disagreement(), None);
 }
