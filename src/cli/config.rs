@@ -79,7 +79,9 @@ pub fn run(args: &Config) -> Result<Outcome> {
     };
     match &args.action {
         Action::Check { file } => {
-            layered(file, argv(file))?.settings()?.check()?;
+            let layered = layered(file, argv(file))?;
+            layered.serve.recording()?;
+            layered.settings()?.check()?;
             print(&format!("{}: in order\n", file.display()))?;
         }
         Action::Show { file } => print(&layered(file, argv(file))?.show())?,

@@ -319,7 +319,7 @@ impl Serve {
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag.
-    fn recording(&self) -> Result<Option<recorder::Settings>> {
+    pub(super) fn recording(&self) -> Result<Option<recorder::Settings>> {
         let named = |flag: &str, error: Error| {
             Error::usage(Diagnostic::from(&error).at(format_args!("--{flag}")))
         };
@@ -345,6 +345,19 @@ impl Serve {
                     path.display()
                 ))
                 .help("give it a name that ends in .mcap"),
+            ));
+        }
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "--record {}: there is no folder {}",
+                    path.display(),
+                    folder.display()
+                ))
+                .help("a recording makes files, and no folders"),
             ));
         }
         let mut settings = recorder::Settings::new(path);

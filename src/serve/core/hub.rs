@@ -431,6 +431,13 @@ impl Hub {
         }
         match sensor.owner {
             Some(owner) if owner != run.client && !self.is_left(&sensor) => {
+                // Who prints lines and reads none would never hear of it.
+                log_throttle::warn(
+                    &format!("in use {id}"),
+                    &format!(
+                        "{id}: another connection sends samples of this id, too, and they are refused: give it an id of its own"
+                    ),
+                );
                 return Err(refuse(
                     "id_in_use",
                     Kind::InUse,

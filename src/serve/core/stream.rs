@@ -548,7 +548,7 @@ fn explained(verdict: Verdict) -> &'static str {
             "a sample older than what was already integrated; send in order, and after a connection was lost from the first sample on (a new run) or from the last one taken"
         }
         Verdict::NoStamp => {
-            "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or take the time of arrival: ?stamp=arrival behind the address (--stamp arrival of the daemon) makes it even, --time log takes it as it is"
+            "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or take the time of arrival: --stamp arrival of the daemon (or ?stamp=arrival behind the address of a listener) makes it even, --time log takes it as it is"
         }
         Verdict::StrayStamp => "a stamp far ahead of its neighbours",
         Verdict::FarStamp => {

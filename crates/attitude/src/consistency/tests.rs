@@ -3,8 +3,8 @@
 
 mod simulation;
 
-use super::bank::WANDERS;
 use self::simulation::{Sample, roll_only, simulate};
+use super::bank::WANDERS;
 use super::*;
 use crate::propagate::shared_data;
 use crate::quaternion::BodyRate;

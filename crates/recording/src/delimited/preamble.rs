@@ -35,6 +35,8 @@ pub(super) struct Preamble {
     pub(super) mscale: Option<f64>,
     /// The axes that a `.gcsv` names, as `--body` takes them.
     pub(super) orientation: Option<String>,
+    /// Whether strapd wrote it: its columns are those of the body, and the letters are for Gyroflow alone.
+    pub(super) is_ours: bool,
 }
 
 /// Names of a rate of samples, without blanks and `_`.
@@ -105,6 +107,7 @@ impl Preamble {
                     "ascale" => found.ascale = number,
                     "mscale" => found.mscale = number,
                     "orientation" => found.orientation = Some(crate::text::printable(value)),
+                    "vendor" => found.is_ours = value == "strapd",
                     _ => {}
                 }
             }

@@ -260,7 +260,9 @@ impl Roles<'_> {
         if let Some((_, _, Unit::Temperature(scale, zero))) = temperature {
             table.scales.temperature = [scale, zero];
         }
-        if let Some(axes) = &self.preamble.orientation {
+        if let Some(axes) = &self.preamble.orientation
+            && !self.preamble.is_ours
+        {
             notes.push(match axes.parse::<BodyAxes>() {
                 Ok(_) => format!(
                     "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
