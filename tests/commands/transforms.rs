@@ -73,6 +73,16 @@ fn a_robots_tree_stays_one_and_its_base_has_the_attitude() {
     assert_eq!(parent(&reverse, "world"), Some("base_link"));
     let [_, back] = roll_and_yaw(&reverse, "world");
     assert!((back + yaw).abs() < 1e-6, "{back} {yaw}");
+    // Copied beside its own tree, the sensor would have two parents; and how it is mounted is no attitude of it.
+    let torn = strapd(at, "replay robot.mcap --copy-input --force -o torn.mcap -v");
+    let both = format!("{}{}", torn.out, torn.err);
+    assert!(
+        both.contains("imu_link hangs on base_link by /tf_static")
+            && both.contains("--base-frame base_link"),
+        "{both}"
+    );
+    let report = strapd(at, "report robot.mcap --force -o robot.html");
+    assert!(!report.err.contains("from the reference"), "{report:?}");
     assert_eq!(
         parent(&replayed(at, "--frame-id body"), "body"),
         Some("world")
@@ -107,5 +117,5 @@ fn a_recording_without_frames_says_what_is_missing() {
     let dir = tempfile::tempdir().unwrap();
     let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/xsens_mti.mcap");
     let asked = format!("replay {fixture} --base-frame base_link -o out.mcap");
-    strapd(dir.path(), &asked).refused(1, &["/tf_static", "it holds nothing", "--mount"]);
+    strapd(dir.path(), &asked).refused(1, &["there is no /tf_static", "--mount"]);
 }

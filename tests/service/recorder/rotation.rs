@@ -32,7 +32,8 @@ fn a_recording_split_by_size_loses_nothing_between_its_files_and_overwrites_none
         .collect();
     assert_eq!(
         &names[..4],
-        ["a_0000.mcap", "a_0002.mcap", "a_0003.mcap", "a_0004.mcap"]
+        ["a_0002.mcap", "a_0003.mcap", "a_0004.mcap", "a_0005.mcap"],
+        "behind what is there: one that was moved away is not replaced by a newer one"
     );
     assert_eq!(
         std::fs::read(dir.path().join("a_0001.mcap")).unwrap(),

@@ -78,7 +78,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 25] = [
+const FAULTS: [Fault; 26] = [
     ("good", |_, _| {}, "", ""),
     ("absent", |_, s| s.gyro = [0.0; 3], "gyro-dead", ""),
     (
@@ -217,6 +217,16 @@ const FAULTS: [Fault; 25] = [
         |n, s| {
             if n >= 1100 {
                 s.accel = s.accel.map(|v| v / 9.81)
+            }
+        },
+        "accel-unit-change",
+        "",
+    ),
+    (
+        "other way half way",
+        |n, s| {
+            if n >= 1100 {
+                s.accel = s.accel.map(|v| -v)
             }
         },
         "accel-unit-change",

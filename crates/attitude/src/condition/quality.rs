@@ -356,9 +356,10 @@ impl Quality {
             gyro == [0.0; 3] && self.previous.is_some_and(|previous| previous != [0.0; 3]);
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        // A motion goes on: a word for nothing (-999, 655.35) between readings is no rate.
-        let is_fast = (DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak);
-        self.so_far.fast_rows += u64::from(is_fast && self.was_fast && !held);
+        // A motion goes on, and is no word for nothing on every axis (-999, 655.35).
+        let is_word = gyro == [gyro[0]; 3];
+        let is_fast = !is_word && (DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak);
+        self.so_far.fast_rows += u64::from(is_fast && self.was_fast);
         self.was_fast = is_fast;
         for (axis, v) in self.axes.iter_mut().zip(gyro) {
             axis.push(v);

@@ -6,11 +6,13 @@
 
 mod force;
 mod rate;
+mod sign;
 
 use super::gate::{Entry, finite_accel};
 use crate::record::Nanos;
 use force::ForceLevel;
 use rate::RateUnit;
+use sign::ForceSign;
 
 /// Units of a gyro: ratio of their readings for the same rate, the unit of the larger, of the smaller.
 pub const GYRO_UNITS: [(f64, &str, &str); 3] = [
@@ -30,7 +32,7 @@ pub const ACCEL_UNITS: [(f64, &str, &str); 3] = [
 pub struct UnitChange {
     /// Stamp of the first sample behind it, or near it.
     pub at: Nanos,
-    /// Readings behind it by those before, for the same motion.
+    /// Readings behind it by those before, for the same motion; -1 where the sign changed.
     pub factor: f64,
     /// Whether the readings before it had the unit they were taken for; `None` where that is not known.
     pub is_first_right: Option<bool>,
@@ -49,6 +51,7 @@ pub struct UnitChanges {
 #[derive(Clone, Debug, Default)]
 pub(super) struct UnitWatch {
     force: ForceLevel,
+    sign: ForceSign,
     rate: RateUnit,
 }
 
@@ -60,7 +63,11 @@ impl UnitWatch {
             return;
         };
         if found.accel.is_none() {
-            found.accel = self.force.take(entry.stamp, force.norm_squared());
+            let turned = self.sign.take(entry, is_rate, &force);
+            found.accel = self
+                .force
+                .take(entry.stamp, force.norm_squared())
+                .or(turned);
         }
         if is_rate && found.gyro.is_none() {
             found.gyro = self.rate.take(entry.stamp, &entry.value, &force);

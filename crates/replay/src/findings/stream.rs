@@ -101,6 +101,14 @@ fn changed(
     units: &[(f64, &str, &str)],
 ) -> Finding {
     let factor = change.factor;
+    if factor < 0.0 {
+        let what = format!(
+            "the {sensor} reads the other way from {at:.1} s after the start on: gravity turns round in one sample, and the gyro does not"
+        );
+        return Finding::new(Severity::Error, code, what)
+            .with("at_s", at)
+            .with("factor", factor);
+    }
     let is_near = |ratio: f64| (factor / ratio - 1.0).abs() < NEAR;
     let named = units.iter().find_map(|(ratio, larger, smaller)| {
         match (is_near(*ratio), is_near(1.0 / ratio)) {
@@ -134,8 +142,10 @@ fn advised(found: Finding, (change, at): (&UnitChange, f64), is_live: bool) -> F
         format!("{:.1}", (at - 0.2).max(0.0)),
         format!("{:.1}", at + 0.5),
     );
-    let found =
-        found.advise("the attitude is wrong after it: take each part by itself, with its own unit");
+    let found = found.advise(match change.factor < 0.0 {
+        true => "the attitude is wrong after it: take each part by itself, with its own sign",
+        false => "the attitude is wrong after it: take each part by itself, with its own unit",
+    });
     let is_gyro = found.code == GYRO_UNIT_CHANGE;
     let (before, behind) = (UNTIL.to(before), START.to(behind));
     match change.is_first_right.filter(|_| is_gyro) {

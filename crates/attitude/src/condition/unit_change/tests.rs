@@ -147,3 +147,40 @@ fn motion_of_any_kind_changes_no_unit() {
     };
     assert_eq!(found((0..8000).map(still)), none);
 }
+
+#[test]
+fn an_accelerometer_that_changes_its_sign_is_found_at_its_sample_and_no_motion_is() {
+    let changed = |n| {
+        let mut entry = swing(n);
+        entry.accel *= if n >= 1200 { -1.0 } else { 1.0 };
+        entry
+    };
+    let change = found((0..3000).map(changed)).accel.unwrap();
+    assert_eq!((change.at, change.factor), (Nanos(1200 * STEP), -1.0));
+    // A glitch comes back, a body that is thrown over turns, and a machine shakes by more than gravity.
+    let glitch = |n| {
+        let mut entry = swing(n);
+        entry.accel *= if n % 400 < 3 { -1.0 } else { 1.0 };
+        entry
+    };
+    assert_eq!(found((0..3000).map(glitch)), UnitChanges::default());
+    let thrown = |n: i64| {
+        let roll = 3.14 * ((n % 300) as f64 * 0.2 - 20.0).clamp(0.0, 1.0);
+        let rate = if (100..105).contains(&(n % 300)) {
+            63.0
+        } else {
+            0.0
+        };
+        entry(
+            n,
+            Vector3::new(rate, 0.0, 0.0),
+            Vector3::new(0.0, roll.sin(), roll.cos()) * G,
+        )
+    };
+    assert_eq!(found((0..290).map(thrown)).accel, None);
+    let shaken = |n: i64| {
+        let force = G + 3.0 * G * (40.0 * n as f64 * 0.01).sin();
+        entry(n, Vector3::zeros(), Vector3::new(0.0, 0.0, force))
+    };
+    assert_eq!(found((0..3000).map(shaken)).accel, None);
+}
