@@ -38,7 +38,7 @@ pub enum Notice {
     Tick,
     /// Change of state.
     Changed,
-    /// Its first stamp is known.
+    /// Beginning: the first stamp is known.
     Begun,
 }
 

@@ -2,12 +2,14 @@
 
 use super::decoders::{Decoders, plain};
 use super::payload_type::PayloadType;
-use super::static_transforms::is_mounting;
 use super::topics::{Candidate, PICKED_UNNAMED};
 use crate::decode::{Decoder, Rank, Role, Stated, Unsupported, role_of};
 use crate::mcap::Channel;
 use std::sync::Arc;
 use strapd_attitude::record::Nanos;
+
+/// Topic of frames that do not move.
+pub const TF_STATIC: &str = "/tf_static";
 
 /// A channel and its first message.
 #[derive(Clone, Debug)]
@@ -130,6 +132,12 @@ impl LogChannel {
         decoders.settle_unit(&mut decoder, first)?;
         Ok(decoder)
     }
+}
+
+/// Whether a topic holds how frames lie in each other: that of a robot in a namespace of its own, too.
+#[must_use]
+pub fn is_mounting(topic: &str) -> bool {
+    topic.rsplit('/').next() == TF_STATIC.strip_prefix('/')
 }
 
 /// Whether a payload holds this name whole, in whatever encoding: all of them have texts as they are.

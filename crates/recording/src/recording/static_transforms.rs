@@ -4,6 +4,7 @@
 //! copy from the robot's description.
 
 use super::channel_route::{Item, Route};
+use super::log_channel::TF_STATIC;
 use super::message_reader::MessageReader;
 use super::opened::{AHEAD, Recording};
 use crate::error::{Error, Result};
@@ -14,16 +15,8 @@ use std::ops::ControlFlow;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::quaternion::Quaternion;
 
-/// Topic of frames that do not move.
-pub const TF_STATIC: &str = "/tf_static";
 /// Most transforms that are kept: a robot has some hundred.
 const MOST: usize = 10_000;
-
-/// Whether a topic holds how frames lie in each other: that of a robot in a namespace of its own, too.
-#[must_use]
-pub fn is_mounting(topic: &str) -> bool {
-    topic.rsplit('/').next() == Some(plain(TF_STATIC))
-}
 
 /// Returns a name without the slash that ROS 1 had before it.
 fn plain(name: &str) -> &str {

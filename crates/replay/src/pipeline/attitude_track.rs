@@ -25,10 +25,9 @@ use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::{Item, Route};
 use strapd_recording::recording::decoders::Decoders;
-use strapd_recording::recording::log_channel::{LogChannel, rank};
+use strapd_recording::recording::log_channel::{LogChannel, is_mounting, rank};
 use strapd_recording::recording::opened::{AHEAD, problems};
 use strapd_recording::recording::sources::is_same;
-use strapd_recording::recording::static_transforms::is_mounting;
 use strapd_recording::recording::topics;
 use strapd_recording::text::printable;
 

@@ -31,8 +31,9 @@ use strapd_recording::recording::beside::AuxiliaryInputs;
 use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::incoming::{Incoming, incoming};
 use strapd_recording::recording::input::is_pipe;
+use strapd_recording::recording::log_channel::{TF_STATIC, is_mounting};
 use strapd_recording::recording::opened::{A_LITTLE_AHEAD, AHEAD};
-use strapd_recording::recording::static_transforms::{StaticTransforms, TF_STATIC, is_mounting};
+use strapd_recording::recording::static_transforms::StaticTransforms;
 use strapd_recording::text::printable;
 
 /// Does it. `watch` is told where it is, often.

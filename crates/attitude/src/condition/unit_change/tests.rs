@@ -165,7 +165,7 @@ fn an_accelerometer_that_changes_its_sign_is_found_at_its_sample_and_no_motion_i
     };
     assert_eq!(found((0..3000).map(glitch)), UnitChanges::default());
     let thrown = |n: i64| {
-        let roll = 3.14 * ((n % 300) as f64 * 0.2 - 20.0).clamp(0.0, 1.0);
+        let roll = std::f64::consts::PI * ((n % 300) as f64 * 0.2 - 20.0).clamp(0.0, 1.0);
         let rate = if (100..105).contains(&(n % 300)) {
             63.0
         } else {

@@ -149,7 +149,9 @@ mod tests {
             Finding::new(Severity::Warning, "code", long).advise("this helps"),
             Finding::new(Severity::Warning, "code", "another"),
         ];
-        let (_, said) = topic.brief(&[]).pop().unwrap();
+        let Some((_, said)) = topic.brief(&[]).pop() else {
+            unreachable!()
+        };
         assert!(
             said.starts_with("word word ") && said.ends_with("word ...; this helps (and 2 more)"),
             "{said}"
