@@ -150,6 +150,7 @@ settings! {
     AGAINST_RECORDED = "against_recorded";
     AID = "aid";
     AT = "at";
+    BASE_FRAME = "base_frame";
     BIAS = "bias";
     BODY = "body";
     CALIBRATION = "calibration";
@@ -193,6 +194,7 @@ settings! {
     STAMPS = "stamps";
     START = "start";
     START_STAMP = "start_stamp";
+    TF = "tf";
     TIME = "time";
     TOKEN_FILE = "token_file";
     TOPIC = "topic";

@@ -19,7 +19,7 @@ use std::path::Path;
 use std::time::Instant;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{EstimationSettings, Patience, Preparation, Prepared};
-use strapd_attitude::setting::MEND;
+use strapd_attitude::setting::{BASE_FRAME, MEND, TF};
 use strapd_recording::Input;
 use strapd_recording::MadeBefore;
 use strapd_recording::Recording;
@@ -239,7 +239,7 @@ fn warn_of_second_parents(
                 Diagnostic::new(format!(
                     "{frame} hangs on {root} by {TF_STATIC}, and a frame has one parent: the transform from the world tears that tree"
                 ))
-                .help(format!("--base-frame {root} gives the attitude of {root}; --tf reverse or none")),
+                .help(format!("{BASE_FRAME} {root} gives the attitude of {root}; {TF} reverse or none")),
             );
         }
     }

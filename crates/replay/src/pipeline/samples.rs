@@ -94,7 +94,9 @@ fn estimate_by<E>(
     for (n, raw) in samples.enumerate() {
         estimator.take(&raw);
         if !raw.is_beside {
-            topic.zeros.take(raw.gyro);
+            topic
+                .zeros
+                .take(raw.gyro.map(|gyro| topic.resolved.rates(gyro)));
         }
         if (n + 1).is_multiple_of(BLOCK) {
             let attitudes = estimator.attitudes(&Sequential);

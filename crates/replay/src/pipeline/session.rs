@@ -112,23 +112,37 @@ impl WarmingWatch {
     }
 }
 
-/// Samples that are exactly zero about all axes between two that are not: what a driver without data says. A
-/// rest is longer.
+/// Samples that are exactly zero about all axes between two that are not: what a driver without data says. Several in a
+/// row are a rest, but where the body turns before them and behind.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LoneZeros {
     /// Number.
     pub count: u64,
-    previous: Option<[f64; 3]>,
-    last_is_lone: bool,
+    /// Zeros in a row by now, and the largest rate of the sample before them or of the last, rad/s.
+    run: u64,
+    before: Option<f64>,
 }
 
+/// Rate, rad/s, of a body that no single sample brings to rest.
+const TURNS: f64 = 0.3;
+
 impl LoneZeros {
-    pub(super) fn take(&mut self, gyro: Option<[f64; 3]>) {
-        let Some(gyro) = gyro else { return };
-        let is_zero = gyro == [0.0; 3];
-        self.count += u64::from(self.last_is_lone && !is_zero);
-        self.last_is_lone = is_zero && self.previous.is_some_and(|p| p != [0.0; 3]);
-        self.previous = Some(gyro);
+    /// Takes rates, rad/s.
+    pub(super) fn take(&mut self, rates: Option<[f64; 3]>) {
+        let Some(rates) = rates else { return };
+        let largest = rates
+            .iter()
+            .fold(0.0, |most: f64, rate| most.max(rate.abs()));
+        if rates == [0.0; 3] {
+            self.run += 1;
+            return;
+        }
+        let run = std::mem::take(&mut self.run);
+        if let Some(before) = self.before.replace(largest)
+            && (run == 1 || before.min(largest) > TURNS)
+        {
+            self.count += run;
+        }
     }
 }
 
@@ -371,7 +385,9 @@ impl Session {
                 }
                 self.samples += 1;
                 topic.estimator.take(&raw);
-                topic.zeros.take(raw.gyro);
+                topic
+                    .zeros
+                    .take(raw.gyro.map(|gyro| topic.resolved.rates(gyro)));
                 let kind = topic.resolved.kind;
                 let is_rate = matches!(kind, SampleKind::Rate | SampleKind::Average);
                 if let Some(gyro) = raw.gyro.filter(|_| is_rate) {
@@ -578,4 +594,25 @@ pub(super) struct FinishedRun {
     pub topics: Vec<Topic>,
     /// Outputs by name.
     pub outputs: Vec<(String, Written)>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_amid_a_rotation_are_counted_and_a_rest_is_not() {
+        let count = |rates: &[f64]| {
+            let mut zeros = LoneZeros::default();
+            rates
+                .iter()
+                .for_each(|rate| zeros.take(Some([*rate, 0.0, 0.0])));
+            zeros.count
+        };
+        assert_eq!(count(&[1.0, 0.0, 0.0, 0.0, 1.2, 0.0, 1.1]), 4);
+        // One that slows down, one that begins, one that ends, and a single one however slow it is.
+        assert_eq!(count(&[0.4, 0.1, 0.0, 0.0, 0.0, 0.6]), 0);
+        assert_eq!(count(&[0.0, 0.0, 1.0, 1.0, 0.0, 0.0]), 0);
+        assert_eq!(count(&[0.01, 0.0, 0.01]), 1);
+    }
 }
