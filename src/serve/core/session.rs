@@ -284,7 +284,7 @@ impl Session {
         scratch: &mut Scratch,
     ) {
         self.flush(received, scratch, usize::MAX);
-        match self.subject() {
+        match self.subject().or_else(|| losing::stated(line)) {
             Some(subject) => self.owned.undecodable_of(&subject, &self.hub, &self.client),
             None => self.owned.undecodable(&self.hub, &self.client),
         }

@@ -12,6 +12,12 @@ struct Named {
     id: Option<String>,
 }
 
+/// Sensor that a line states which is no sample.
+pub(super) fn stated(line: &[u8]) -> Option<String> {
+    let said: Named = serde_json::from_slice(line).ok()?;
+    exact_name(&said.id?).ok().filter(|id| !id.is_empty())
+}
+
 impl Session {
     /// A line brought no sample, though it should have.
     pub(super) fn lose(&self, fault: &Fault, number: u64, line: &[u8]) {
@@ -19,11 +25,7 @@ impl Session {
         if !fault.is_loss() {
             return;
         }
-        let named = || {
-            let said: Named = serde_json::from_slice(line).ok()?;
-            exact_name(&said.id?).ok().filter(|id| !id.is_empty())
-        };
-        let sensor = self.subject().or_else(named);
+        let sensor = self.subject().or_else(|| stated(line));
         self.hub.losses.add(&Lost {
             source: sensor.as_ref().unwrap_or(&self.client.peer.name),
             fault,
@@ -76,5 +78,26 @@ mod tests {
         );
         assert_eq!(status["refused"][0]["source"], "a");
         assert_eq!(status["refused"].as_array().map(Vec::len), Some(1));
+    }
+
+    #[test]
+    fn a_bad_line_that_states_its_sensor_is_that_ones_and_not_of_whoever_came_last() {
+        let hub = Arc::new(Hub::new(Settings::default()).unwrap());
+        let mut session = Session::new(&hub, "both".to_owned(), true);
+        let mut scratch = Scratch::default();
+        let mut send = |line: String| session.bytes(line.as_bytes(), Nanos(0), &mut scratch);
+        for n in 1..=3 {
+            let stamp = format!("\"stamp\":{{\"sec\":{n},\"nsec\":0}}");
+            send(format!("{{\"id\":\"b\",\"gyro\":[0.1,0,0],{stamp}}}\n"));
+            send(format!("{{\"id\":\"a\",\"gyro\":[0.1,0,0],{stamp}}}\n"));
+            send(format!("{{\"id\":\"b\",\"gyro\":null,{stamp}}}\n"));
+        }
+        let status: serde_json::Value = serde_json::from_slice(&hub.status()).unwrap();
+        let bad = |n: usize| &status["sources"][n]["counts"]["undecodable"];
+        assert_eq!(
+            (bad(0), bad(1)),
+            (&serde_json::Value::Null, &3.into()),
+            "{status}"
+        );
     }
 }
