@@ -308,8 +308,22 @@ fn a_message_of_zeros_amid_motion_is_said() {
         ran.done().out.contains("2 of 300 samples are exactly zero"),
         "{ran:?}"
     );
-    // A body that rests, without noise, is another thing.
+    // So are a hundred in a row: no body stops, and goes on, within a sample.
     samples[100..200].iter_mut().for_each(|s| s.gyro = [0.0; 3]);
+    crate::made_logs::written(dir.path(), "log.mcap", &samples);
+    let ran = strapd(dir.path(), "replay log.mcap -o null:");
+    assert!(
+        ran.done()
+            .out
+            .contains("101 of 300 samples are exactly zero"),
+        "{ran:?}"
+    );
+    // A body that comes to rest, without noise, is another thing.
+    samples[200].gyro = samples[201].gyro;
+    for (n, sample) in samples.iter_mut().enumerate() {
+        let slow = (n.abs_diff(150) as f64 - 50.0).clamp(0.0, 40.0) / 40.0;
+        sample.gyro = sample.gyro.map(|rate| rate * slow);
+    }
     crate::made_logs::written(dir.path(), "log.mcap", &samples);
     let ran = strapd(dir.path(), "replay log.mcap -o null:");
     assert!(!ran.done().out.contains("exactly zero"), "{ran:?}");
