@@ -48,7 +48,7 @@ const SLACK_NANOS: i64 = 1_000;
 const BIAS_FREE: f64 = 0.1;
 const BIAS_KNOWN: f64 = 0.01;
 /// Change of the running length of gravity with a block.
-const GRAVITY_OF_UNIT: f64 = 1.002;
+const GRAVITY_STEP: f64 = 1.002;
 /// The bank runs once this share of the last segments, of which there are so many, scatters by more than this, g.
 const GATE_SCATTER: f64 = 0.05;
 const GATE_SHARE: f64 = 0.4;
@@ -330,8 +330,8 @@ impl Consistency {
         let length = block.force.norm();
         let gravity = match self.gravity {
             None => length,
-            Some(gravity) if length > gravity => gravity * GRAVITY_OF_UNIT,
-            Some(gravity) => gravity / GRAVITY_OF_UNIT,
+            Some(gravity) if length > gravity => gravity * GRAVITY_STEP,
+            Some(gravity) => gravity / GRAVITY_STEP,
         };
         self.gravity = (gravity > 0.0).then_some(gravity);
         if self.gravity.is_none() {

@@ -71,6 +71,12 @@ fn what_is_wrong_in_a_file_is_named_with_its_place() {
             "--allow-insecure-remote",
         ),
         ("aid = \"none\"\nbias = \"auto\"", "--bias x,y,z"),
+        (
+            "record = \"r.mcap\"\nrecord-split = \"bananas\"",
+            "--record-split",
+        ),
+        ("record = \"/nowhere/r.mcap\"", "no folder /nowhere"),
+        ("record = \"r.csv\"", "ends in .mcap"),
         ("sensor = 1", "[sensor.ID]"),
         ("[sensor.a]\nlisten = \"x\"", "[sensor.a]"),
         ("[sensor.a]\nworld = \"up\"", "up"),

@@ -52,7 +52,7 @@ impl Names {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let number = |name: &str| {
             let digits = name.strip_prefix(&*stem)?.strip_prefix('_')?;
-            let number = digits.split('.').next()?.parse::<u64>().ok()?;
+            let number = digits.split('.').next()?.parse::<u32>().ok()?.into();
             (self.number(number).file_name()?.to_str()? == name).then_some(number)
         };
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
