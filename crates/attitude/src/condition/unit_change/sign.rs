@@ -37,7 +37,7 @@ impl Held {
     }
 
     fn is_at(&self, force: &Vector3<f64>) -> bool {
-        (force - self.mean).norm() < STAYS * self.mean.norm()
+        (force - self.mean).norm_squared() < STAYS * STAYS * self.mean.norm_squared()
     }
 
     fn take(&mut self, force: &Vector3<f64>) {
@@ -72,11 +72,9 @@ impl ForceSign {
             .last
             .replace(at)
             .map_or(i64::MAX, |last| at.since(last));
-        let turn = match is_rate {
-            true => entry.value.norm() * step as f64 * 1e-9,
-            false => entry.value.norm(),
-        };
-        let is_whole = (1..=STEP_NANOS).contains(&step) && turn < TURN;
+        let secs = if is_rate { step as f64 * 1e-9 } else { 1.0 };
+        let turn = entry.value.norm_squared() * (secs * secs);
+        let is_whole = (1..=STEP_NANOS).contains(&step) && turn < TURN * TURN;
         let Some(held) = self.held.as_mut().filter(|_| is_whole) else {
             *self = ForceSign {
                 last: Some(at),
