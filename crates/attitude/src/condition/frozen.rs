@@ -103,10 +103,11 @@ impl Axis {
         self.samples += 1;
         if rate != self.last {
             let change = (rate - self.last).abs();
-            match change > LEAP * self.quantum {
-                true if self.is_frozen() => self.note(),
-                true => {}
-                false => self.longest = self.longest.max(self.run),
+            let leaps = change > LEAP * self.quantum;
+            if !leaps {
+                self.longest = self.longest.max(self.run);
+            } else if self.is_frozen() {
+                self.note();
             }
             if change > 0.0 {
                 self.quantum = self.quantum.min(change);

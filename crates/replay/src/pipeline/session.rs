@@ -385,13 +385,12 @@ impl Session {
                 }
                 self.samples += 1;
                 topic.estimator.take(&raw);
-                topic
-                    .zeros
-                    .take(raw.gyro.map(|gyro| topic.resolved.rates(gyro)));
+                let rates = raw.gyro.map(|gyro| topic.resolved.rates(gyro));
+                topic.zeros.take(rates);
                 let kind = topic.resolved.kind;
                 let is_rate = matches!(kind, SampleKind::Rate | SampleKind::Average);
-                if let Some(gyro) = raw.gyro.filter(|_| is_rate) {
-                    topic.broken.push(&topic.resolved.rates(gyro));
+                if let Some(rates) = rates.filter(|_| is_rate) {
+                    topic.broken.push(&rates);
                 }
                 if let Some(history) = &mut topic.history {
                     history.took(Some(&raw), &topic.estimator.conditioning().counts);
