@@ -118,6 +118,25 @@ fn the_token_is_shown_and_its_absence_is_said() {
 }
 
 #[test]
+fn an_output_that_asks_for_a_token_took_nothing_and_that_is_a_failure() {
+    let mut settings = listening(&[TCP]);
+    settings.hub.token = Some(Token::new("correct horse battery"));
+    let daemon = Daemon::start(settings);
+    let output = format!("tcp://{}", daemon.address(0));
+    // All is written before the answer comes, and far more than a socket holds.
+    for duration in ["0.1", "5"] {
+        let refused = run(&["simulate", "hand", "--duration", duration, "-o", &output]);
+        let words = said(&refused);
+        assert_eq!(refused.status.code(), Some(3), "{duration} s: {words}");
+        assert!(words.contains("asks for a token"), "{duration} s: {words}");
+        assert!(
+            words.contains(&format!("strapd send - {output}")),
+            "{words}"
+        );
+    }
+}
+
+#[test]
 fn complaints_are_heard_and_counted() {
     let daemon = Daemon::tcp();
     let address = format!("tcp://{}", daemon.address(0));

@@ -185,13 +185,15 @@ impl Output {
     /// [`Error::Write`]; [`Error::OutputExists`] when somebody else created the file meanwhile.
     pub(super) fn finish(mut self) -> Result<Flow> {
         let flow = self.flush()?;
+        if let Output::Tcp(tcp) = &self {
+            return self.judge(tcp.finish());
+        }
         match self {
             Output::Part(part) => part.publish()?,
             Output::Upload(upload) => upload.finish()?,
-            Output::Tcp(tcp) => tcp.finish(),
             Output::Udp(udp) => udp.finish(),
             Output::Conversation(talk) => talk.finish(),
-            Output::Direct { .. } | Output::Stdout(_) | Output::Null => {}
+            Output::Direct { .. } | Output::Stdout(_) | Output::Tcp(_) | Output::Null => {}
         }
         Ok(flow)
     }

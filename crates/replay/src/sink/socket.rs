@@ -16,6 +16,8 @@ const CONNECT: Duration = Duration::from_secs(10);
 const STALLED: Duration = Duration::from_secs(30);
 /// Time that the other side may take to read the rest and close.
 const CLOSE: Duration = Duration::from_secs(2);
+/// Code of a daemon's answer to who shows no token.
+const UNAUTHORISED: &str = "unauthorised";
 /// Longest answer that is looked at.
 const MAX_ANSWER: u64 = 64 << 10;
 
@@ -44,8 +46,8 @@ fn connecting(name: &str, source: io::Error) -> Error {
 pub(super) struct Tcp {
     name: String,
     stream: TcpStream,
-    /// Hangs up when the other side has closed.
-    closed: Receiver<()>,
+    /// Refusal of everything that was sent, if there was one; comes when the other side has closed.
+    closed: Receiver<Option<String>>,
 }
 
 impl Tcp {
@@ -82,8 +84,8 @@ impl Tcp {
         std::thread::Builder::new()
             .name("strapd-answers".to_owned())
             .spawn(move || {
-                hear(&peer, answers);
-                drop(open);
+                // Nobody waits for it where the run has ended.
+                let _ = open.send(hear(&peer, answers));
             })?;
         Ok(Tcp {
             name,
@@ -104,39 +106,70 @@ impl Tcp {
                     ErrorKind::TimedOut,
                     format!("it has taken nothing for {} s", STALLED.as_secs()),
                 ),
-                _ => why,
+                // It has gone: why, it may have said.
+                _ => self.refusal().err().unwrap_or(why),
             })
     }
 
     /// Everything was written: waits for a moment until the other side has read it.
-    pub(super) fn finish(self) {
+    ///
+    /// # Errors
+    /// The other side says that it took nothing, since it asks for a token.
+    pub(super) fn finish(&self) -> io::Result<()> {
         // It may have gone already.
         let _ = self.stream.shutdown(Shutdown::Write);
-        let _ = self.closed.recv_timeout(CLOSE);
+        let taken = self.refusal();
         let _ = self.stream.shutdown(Shutdown::Both);
+        taken
+    }
+
+    /// Waits for a moment until the other side has closed: an error where it has refused everything.
+    fn refusal(&self) -> io::Result<()> {
+        match self.closed.recv_timeout(CLOSE).ok().flatten() {
+            Some(why) => Err(io::Error::new(ErrorKind::PermissionDenied, why)),
+            None => Ok(()),
+        }
     }
 }
 
-/// Reads what comes back to its end and says what is an error.
-fn hear(name: &str, stream: TcpStream) {
+/// Reads what comes back to its end and says what is an error; returns the one that refused everything.
+fn hear(name: &str, stream: TcpStream) -> Option<String> {
     let mut lines = BufReader::with_capacity(4 << 10, stream);
     let mut line = Vec::new();
-    let mut said = 0;
+    let (mut said, mut refused) = (0, None);
     loop {
         line.clear();
         match Read::take(&mut lines, MAX_ANSWER).read_until(b'\n', &mut line) {
-            Ok(0) | Err(_) => return,
+            Ok(0) | Err(_) => return refused,
             Ok(_) => {}
         }
-        let text = String::from_utf8_lossy(&line);
-        if said < 10 && text.contains("\"class\":\"ERROR\"") {
+        let Ok(answer) = serde_json::from_slice::<Answer>(&line) else {
+            continue;
+        };
+        if answer.class != "ERROR" {
+            continue;
+        }
+        if answer.code == UNAUTHORISED {
+            refused = Some(format!(
+                "it asks for a token and has taken nothing; write lines to standard output, and \
+                 `strapd send - {name}` shows it"
+            ));
+        } else if said < 10 {
             said += 1;
-            tracing::warn!(
-                "{name}: answers {}",
-                strapd_recording::text::printable(text.trim_end())
-            );
+            let words = strapd_recording::text::printable(&answer.message);
+            tracing::warn!("{name}: {}: {words}", answer.code);
         }
     }
+}
+
+/// Answer of a daemon, as far as it is looked at.
+#[derive(serde::Deserialize)]
+struct Answer {
+    class: String,
+    #[serde(default)]
+    code: String,
+    #[serde(default)]
+    message: String,
 }
 
 /// Datagrams to one place.
