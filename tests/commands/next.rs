@@ -55,6 +55,30 @@ fn follow(log: &Path) -> bool {
 }
 
 #[test]
+fn a_table_without_time_is_told_what_is_missing_and_the_command_runs_with_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let row = |k: u32| format!("{k},{:.4},0,0,0,0,9.81\n", (f64::from(k) * 0.01).sin());
+    let rows: String = (0..500).map(row).collect();
+    std::fs::write(
+        dir.path().join("a.csv"),
+        format!("cnt,gx,gy,gz,ax,ay,az\n{rows}"),
+    )
+    .unwrap();
+    let info = strapd(dir.path(), "info a.csv");
+    let line = info.out.lines().last().unwrap();
+    assert!(line.starts_with("no attitude: nothing says when"), "{line}");
+    // No clock of a table is another one.
+    assert!(!info.out.contains("--time log"), "{}", info.out);
+    let command = line.split("strapd ").nth(1).unwrap().replace("HZ", "100");
+    strapd(dir.path(), &command).done();
+    let check = strapd(dir.path(), "check a.csv --json").lines();
+    let found = check[0]["findings"].as_array().unwrap();
+    let errors = found.iter().filter(|f| f["severity"] == "error");
+    let codes: Vec<_> = errors.map(|f| f["code"].clone()).collect();
+    assert_eq!(codes, ["no-clock"]);
+}
+
+#[test]
 fn what_info_says_to_run_next_runs_over_every_fixture() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
     for log in recordings(&fixtures) {

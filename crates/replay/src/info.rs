@@ -8,7 +8,9 @@ use crate::shell::{flag, quoted_file};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
-use strapd_attitude::setting::{AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, INIT, JOIN, TOPIC};
+use strapd_attitude::setting::{
+    AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, INIT, JOIN, RATE_HZ, TIME, TOPIC,
+};
 use strapd_recording::mcap::Survey;
 use strapd_recording::recording::beside::TopicOfVectors;
 use strapd_recording::recording::log_channel::LogChannel;
@@ -93,6 +95,9 @@ impl Overview<'_> {
                 }
             }
         };
+        if best.has_no_clock() {
+            return None;
+        }
         let mut help: Vec<Choice> = Vec::new();
         let units = of_samples(best)
             .into_iter()
@@ -121,6 +126,13 @@ impl Overview<'_> {
     pub fn why_no_next(&self) -> String {
         match &self.made_before {
             Some(made) => format!("{made}: look at the recording it was made of"),
+            None if self.looked.iter().any(Inspection::has_no_clock) => {
+                let file = typed(self.input.source());
+                let (index, rate) = (TIME.to("index"), RATE_HZ.to("HZ"));
+                format!(
+                    "nothing says when; of HZ samples a second: strapd replay {file} {index} {rate} -o attitude.mcap"
+                )
+            }
             None => format!(
                 "no topic carries a rate: {TOPIC} NAME {FIELD} gyro=PATH takes it from any message"
             ),

@@ -4,6 +4,7 @@
 
 use crate::finding::Finding;
 use crate::summary::TopicSummary;
+use strapd_attitude::condition::ClockWarning;
 use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::condition::stillness::{self, Rests};
 use strapd_attitude::condition::{Clock, ClockSet, GyroUnit};
@@ -53,6 +54,15 @@ pub struct Inspection {
     pub is_likely: bool,
     /// Whether there is an orientation to be held against, in its samples or in messages of its own.
     pub has_reference: bool,
+}
+
+impl Inspection {
+    /// Returns whether no clock of the recording moves: nothing is left but a stated rate.
+    #[must_use]
+    pub fn has_no_clock(&self) -> bool {
+        let warning = self.clock_warning.as_ref();
+        warning.and_then(Diagnostic::code) == Some(ClockWarning::NO_CLOCK)
+    }
 }
 
 /// Measurements in the samples themselves, or on topics of their own, that may correct an attitude.

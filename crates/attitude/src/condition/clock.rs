@@ -104,6 +104,11 @@ pub enum ClockWarning {
     NoneMoves,
 }
 
+impl ClockWarning {
+    /// Code of what is said where no clock moves at all.
+    pub const NO_CLOCK: &str = "no-clock";
+}
+
 impl From<&ClockWarning> for Diagnostic {
     fn from(error: &ClockWarning) -> Diagnostic {
         let what = match error {
@@ -131,7 +136,7 @@ impl From<&ClockWarning> for Diagnostic {
                 .help(format!(
                     "{TIME} index {RATE_HZ} HZ, or where the time stands: {COLUMNS} stamp=NAME:UNIT of a table, {FIELD} stamp=PATH of a message"
                 ))
-                .coded("clock");
+                .coded(ClockWarning::NO_CLOCK);
             }
         };
         Diagnostic::new(what)

@@ -441,11 +441,11 @@ impl Opening {
             _ => None,
         });
         Diagnostic::new(format!(
-            "none of its columns names a rate about x, y and z: `{said}`{}",
+            "none of its columns names a rate about x, y and z, or a quaternion: `{said}`{}",
             aside.unwrap_or_default()
         ))
         .help(format!(
-            "{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)"
+            "{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1); of attitudes orientation=W:X:Y:Z"
         ))
     }
 }

@@ -14,6 +14,7 @@ use super::{Finding, Severity, axes, verdicts};
 use crate::inspection::Inspection;
 use crate::summary::significant;
 use serde_json::json;
+use strapd_attitude::condition::ClockWarning;
 use strapd_attitude::condition::quality::{AxisStats, Clipped};
 use strapd_attitude::record::Counts;
 use strapd_attitude::setting::{BIAS, GYRO_RANGE, GYRO_SCALE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG};
@@ -91,6 +92,9 @@ pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
 /// The same where a run has counted what became of them.
 pub(super) fn of_counted(looked: &Inspection, counts: &Counts) -> Vec<Finding> {
     let mut out = verdicts::find(counts);
+    if looked.has_no_clock() {
+        out.retain(|found| found.code != verdicts::NO_STAMP);
+    }
     out.extend(found_by(&RULES, &Seen::of(looked, counts.total())));
     // What nobody takes unasked spoils nothing.
     if !looked.is_likely {
@@ -149,11 +153,15 @@ fn degrees(seen: &Seen<'_>, out: &mut Vec<Finding>) {
 /// Warning about the clock.
 fn clock(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let name = seen.looked.clock.name();
+    let (severity, code) = match seen.looked.has_no_clock() {
+        true => (Severity::Error, ClockWarning::NO_CLOCK),
+        false => (Severity::Warning, "clock"),
+    };
     out.extend(
         seen.looked
             .clock_warning
             .as_ref()
-            .map(|warning| Finding::said(Severity::Warning, "clock", warning).with("clock", name)),
+            .map(|warning| Finding::said(severity, code, warning).with("clock", name)),
     );
 }
 

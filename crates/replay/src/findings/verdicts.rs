@@ -7,6 +7,9 @@ use super::{Finding, Severity};
 use strapd_attitude::record::{Counts, Verdict};
 use strapd_attitude::setting::{GYRO_UNIT, RATE_HZ, START, TIME, UNTIL};
 
+/// Code of samples without a stamp.
+pub(super) const NO_STAMP: &str = "no-stamp";
+
 /// Each verdict that samples got, but for those that were plainly used.
 pub(super) fn find(counts: &Counts) -> Vec<Finding> {
     let found = |verdict: &Verdict| of(*verdict, counts.get(*verdict), counts.total());
@@ -63,7 +66,7 @@ fn of(verdict: Verdict, n: u64, total: u64) -> Option<Finding> {
         )
         .map(other_clock),
         Verdict::NoStamp => found(
-            (Error, "no-stamp"),
+            (Error, NO_STAMP),
             "samples have no stamp, or one of 0 amid others",
             "take the recorder's time",
         )

@@ -22,7 +22,7 @@ const NOISY_STAMPS: f64 = 0.01;
 /// Stamps that are all zero or equal.
 pub(super) fn stand_still(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let q = &seen.looked.quality;
-    if q.count > 2 && q.spacing.is_none() {
+    if q.count > 2 && q.spacing.is_none() && !seen.looked.has_no_clock() {
         out.push(
             Finding::new(
                 Severity::Error,
