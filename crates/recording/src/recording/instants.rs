@@ -8,7 +8,7 @@ use super::message_reader::MessageReader;
 use super::opened::{AHEAD, Recording};
 use super::warn::Warn;
 use crate::columns::{Delimiter, Meant, Name, Unit};
-use crate::decode::{Bare, Options, bare_of_text, decimal_in_steps, unit_of};
+use crate::decode::{Bare, Options, bare_of_text, decimal_in_steps, instant_of_date, unit_of};
 use crate::error::{Error, Result};
 use crate::format::is_video;
 use crate::gpmf;
@@ -194,6 +194,7 @@ fn of_table(path: &Path) -> Result<Vec<Nanos>> {
     let mut line = Vec::new();
     let mut table: Option<Column> = None;
     let mut stamps: Vec<Bare> = Vec::new();
+    let mut dates: Vec<Nanos> = Vec::new();
     for number in 1_u64.. {
         line.clear();
         let mut limited = reader.by_ref().take(LONGEST_ROW);
@@ -227,6 +228,11 @@ fn of_table(path: &Path) -> Result<Vec<Nanos>> {
             }
         };
         let cell = column.cell(row);
+        if let Some(date) = instant_of_date(&cell) {
+            dates.push(date);
+            few_enough(path, dates.len())?;
+            continue;
+        }
         let stamp = match column.nanos {
             Some(nanos) => decimal_in_steps(&cell, nanos).map(|stamp| Bare::whole(stamp.0)),
             None => bare_of_text(&cell),
@@ -239,11 +245,23 @@ fn of_table(path: &Path) -> Result<Vec<Nanos>> {
                     column.name,
                     snippet(row)
                 ),
-                "a table with a column of stamps (t_ns, t_us, t_ms, t_s), or one number a line",
+                "a table with a column of stamps (t_ns, t_us, t_ms, t_s; or dates of RFC 3339), or one number a line",
             )
         })?;
         stamps.push(stamp);
         few_enough(path, stamps.len())?;
+    }
+    match (stamps.is_empty(), dates.is_empty()) {
+        (true, false) => return Ok(dates),
+        (false, false) => {
+            let what = format!(
+                "{} of its stamps are dates and {} are numbers",
+                dates.len(),
+                stamps.len()
+            );
+            return Err(refused(path, what, "a column of one kind"));
+        }
+        (_, true) => {}
     }
     let Some(column) = table.filter(|_| !stamps.is_empty()) else {
         return Err(refused(path, "it holds no stamps", "one number a line"));
@@ -281,9 +299,12 @@ impl Column {
         let delimiter = Delimiter::TRIED.into_iter().find(holds);
         let delimiter = delimiter.unwrap_or(Delimiter::Byte(b','));
         let cells: Vec<_> = delimiter.cells(row).collect();
-        let is_header = cells
-            .iter()
-            .any(|cell| bare_of_text(&String::from_utf8_lossy(cell)).is_none());
+        // A row that begins with an instant names nothing, whatever stands behind.
+        let is_header = cells.iter().all(|cell| {
+            let text = String::from_utf8_lossy(cell);
+            let text = text.trim();
+            bare_of_text(text).is_none() && instant_of_date(text).is_none()
+        });
         let names = cells.iter().map(|cell| Name::of(cell));
         let named = names
             .enumerate()
@@ -351,6 +372,23 @@ mod tests {
         assert_eq!(read(ns).unwrap()[1], 1_700_000_000_033_366_700);
         let secs = "1700000000.0\n1700000000.5\n\n1700000001.0\n";
         assert_eq!(read(secs).unwrap()[1], 1_700_000_000_500_000_000);
+    }
+
+    #[test]
+    fn dates_are_instants_with_and_without_a_header() {
+        let rows = "2023-11-14T22:13:20.5Z,a\n2023-11-14T23:13:21+01:00,b\n";
+        let expected = [1_700_000_000_500_000_000, 1_700_000_001_000_000_000];
+        assert_eq!(read(rows).unwrap(), expected);
+        assert_eq!(read(&format!("time,name\n{rows}")).unwrap(), expected);
+        assert_eq!(
+            read(&format!("name;time\na;2023-11-14 22:13:20.5\n")).unwrap(),
+            expected[..1]
+        );
+        let mixed = read("time\n2023-11-14T22:13:20Z\n1700000000\n").unwrap_err();
+        assert!(
+            mixed.to_string().contains("1 of its stamps are dates"),
+            "{mixed}"
+        );
     }
 
     #[test]

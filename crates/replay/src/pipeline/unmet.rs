@@ -82,7 +82,18 @@ fn without_attitude(of: &Resampled, topic: &Topic) -> Diagnostic {
         secs(of.span),
         secs(attitudes)
     ))
-    .help("instants are on the clock of the samples' stamps")
+    .help(match (of.span, attitudes) {
+        // They would all lie in it, if it began at 0.
+        (Some((from, to)), Some((first, last))) if from.0 >= 0 && to.0 <= last.since(first) => {
+            format!(
+                "instants are on the clock of the samples' stamps; if these count from the first attitude, \
+                 add {}.{:09} s to each",
+                first.0.div_euclid(1_000_000_000),
+                first.0.rem_euclid(1_000_000_000)
+            )
+        }
+        _ => "instants are on the clock of the samples' stamps".to_owned(),
+    })
 }
 
 /// Whether there were samples, all outside the window that was asked for.
