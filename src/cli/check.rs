@@ -1,6 +1,7 @@
 //! `strapd check FILE...`: every finding about a log, with the flag that helps. I/O.
 
 use super::estimation::Estimation;
+use super::frames::BaseFrame;
 use super::tables::Tables;
 use super::{Global, Outcome, own_output, print, serial, with_each};
 use crate::error::Result;
@@ -35,6 +36,9 @@ pub struct Check {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub base: BaseFrame,
     /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
@@ -66,7 +70,7 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
     let files = own_output::without(args.files.clone(), args.estimation.topic.as_deref())?;
     with_each(&files, |file| {
         let file = serial::captured(file, None)?;
-        let (text, outcome) = one(global, file.path(), &asked, &pool)?;
+        let (text, outcome) = one(global, file.path(), (&asked, &args.base), &pool)?;
         let text = match global.json {
             true => text,
             false => file.retold(&text),
@@ -80,11 +84,13 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
 fn one(
     global: &Global,
     file: &Path,
-    asked: &Examination<'_>,
+    (asked, base): (&Examination<'_>, &BaseFrame),
     pool: &Pool,
 ) -> Result<(String, Outcome)> {
     let input = opening::open(file)?;
-    let checked = examine(&input, asked, pool, &mut |_| {})?;
+    let mut asked = asked.clone();
+    base.put(&mut asked.plan, (&input, &asked.selection), pool)?;
+    let checked = examine(&input, &asked, pool, &mut |_| {})?;
     let found = FindingRow::all(&checked, &checked.plan);
     let open = found.iter().filter(|row| row.answered.is_none());
     let worst = open.map(|row| row.finding.severity).max();

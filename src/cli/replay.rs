@@ -3,7 +3,7 @@
 use super::calibration_files;
 use super::continued;
 use super::estimation::Estimation;
-use super::frames::Frames;
+use super::frames::{BaseFrame, Frames};
 use super::known_words;
 use super::own_output;
 use super::progress::Reporter;
@@ -14,7 +14,6 @@ use super::{Global, Outcome, outputs, print};
 use crate::config::Shard;
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
-use crate::pipeline::mounting;
 use crate::pipeline::opening;
 use crate::pipeline::replay;
 use crate::pipeline::request::ReplayRequest;
@@ -89,17 +88,16 @@ pub struct Replay {
     #[allow(missing_docs)]
     pub frames: Frames,
     /// Name of the frame whose attitude is given [default: as the messages say]
-    #[arg(long, value_name = "NAME", help_heading = "Output")]
-    pub frame_id: Option<String>,
-    /// Give the attitude of this frame of the robot, on which the log's /tf_static says how the sensor is mounted:
-    /// the sensor's own frame keeps its one parent
     #[arg(
         long,
         value_name = "NAME",
-        conflicts_with_all = ["frame_id", "mount"],
+        conflicts_with = "base_frame",
         help_heading = "Output"
     )]
-    pub base_frame: Option<String>,
+    pub frame_id: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub base: BaseFrame,
     /// Write at most this many attitudes a second; the integration always uses every sample
     #[arg(
         long,
@@ -443,9 +441,10 @@ impl Replay {
             }
             _ => Source::parse(log),
         };
-        if let Some(base) = &self.base_frame {
+        if let Some(base) = &self.base.base_frame {
             let path = Self::file_read_twice(&source, &format!("--base-frame {base}"))?;
-            plan.mount = Some(mounting::read(path, &selection, base, pool)?);
+            let input = opening::open(path)?;
+            self.base.put(&mut plan, (&input, &selection), pool)?;
         }
         let reference = self.read_reference(pool)?;
         let instants = self.read_instants(&source, &selection.decode, pool)?;
@@ -455,7 +454,7 @@ impl Replay {
             Source::Stdin => false,
             Source::Elsewhere(_) => true,
         };
-        let body = self.base_frame.as_ref().or(self.frame_id.as_ref());
+        let body = self.base.base_frame.as_ref().or(self.frame_id.as_ref());
         let frames = self.frames.names(body.cloned());
         let served = self.serving.start(
             targets,

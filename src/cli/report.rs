@@ -1,6 +1,7 @@
 //! `strapd report FILE... -o r.html`: one self-contained page about a log, or about several. I/O.
 
 use super::estimation::Estimation;
+use super::frames::BaseFrame;
 use super::progress::Reporter;
 use super::setting_args::{Given, Smoothing};
 use super::tables::Tables;
@@ -51,6 +52,9 @@ pub struct Report {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub smoothing: Given<Smoothing>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub base: BaseFrame,
     /// Layout of a table.
     #[command(flatten)]
     pub tables: Tables,
@@ -200,8 +204,11 @@ impl Report {
         take: &mut dyn FnMut(&Page<'_>) -> Result<Outcome>,
     ) -> Result<Outcome> {
         let input = opening::open(file)?;
+        let mut asked = asked.clone();
+        let with = (&input, &asked.selection);
+        self.base.put(&mut asked.plan, with, pool)?;
         let mut reporter = Reporter::new(global, &input.name().display().to_string());
-        let checked = examine(&input, asked, pool, &mut |position| {
+        let checked = examine(&input, &asked, pool, &mut |position| {
             reporter.update(position);
         });
         reporter.finish();

@@ -110,6 +110,20 @@ fn a_robots_tree_stays_one_and_its_base_has_the_attitude() {
         );
         assert!(ran.code != Some(0) && ran.err.contains(says), "{ran:?}");
     }
+    // What judges the attitude takes the same frame.
+    let roll = |flags: &str| {
+        let page = strapd(
+            at,
+            &format!("report robot.mcap --json --aid gravity {flags}"),
+        )
+        .json();
+        let angle = page["topics"][0]["replay"]["final"]["roll_deg"].as_f64();
+        angle.unwrap_or_else(|| panic!("{page:#}"))
+    };
+    let rolls = [roll(""), roll("--base-frame base_link")];
+    assert!(rolls[0].abs() > 179.0 && rolls[1].abs() < 0.1, "{rolls:?}");
+    let check = strapd(at, "check robot.mcap --base-frame nowhere");
+    assert!(check.err.contains("does not say how"), "{check:?}");
 }
 
 #[test]

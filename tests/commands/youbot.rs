@@ -49,6 +49,26 @@ fn the_documents_check_pose_in_degrees() {
 }
 
 #[test]
+fn a_pose_as_it_is_answered_is_a_request() {
+    let pose = one(&["fk"], json!({"q": [0.3, 0.4, -0.9, 0.8, 0.2]}));
+    let back = one(&["ik"], pose.clone());
+    let found = back["solutions"].as_array().unwrap();
+    let is_it = |s: &Value| (s["q"][2].as_f64().unwrap() + 0.9).abs() < 1e-9;
+    assert!(found.iter().any(is_it), "{back}");
+    let mut other = pose;
+    other["quat"] = json!({"w": 1, "x": 0, "y": 0, "z": 0});
+    let (answers, code) = ask(&["ik"], &[other]);
+    assert_eq!(code, 3);
+    assert!(
+        answers[0]["error"]
+            .as_str()
+            .unwrap()
+            .contains("two orientations"),
+        "{answers:?}"
+    );
+}
+
+#[test]
 fn joints_of_the_driver_go_in_and_come_out() {
     let u = [20.0, 60.0, -100.0, 90.0, 120.0];
     let request = json!({"q": u, "joints": "driver", "preset": "urdf"});

@@ -33,7 +33,7 @@ pub enum What {
   \"preset\":\"seed\"|\"urdf\"     lengths of the document's table (default) or of the URDF
   \"joints\":\"seed\"|\"driver\"   what joint angles mean: the document's q (default) or the encoders' u
 
-Answer: p (m, base axes), r (rows, tool to base), quat, within_limits.
+Answer: p (m, base axes), r (rows, tool to base), quat, within_limits; a request of ik as it is.
 
 Example:
   echo '{\"q\":[0,0,0,90,0]}' | strapd model youbot fk --degrees --table")]

@@ -2,9 +2,7 @@
 //!
 //! Apart from the replay because it is known before a sample is understood: it takes the place of a setting.
 
-use super::opening;
 use crate::error::{Error, Result};
-use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::frames::{Body, Sensor};
 use strapd_attitude::quaternion::Quaternion;
@@ -13,7 +11,7 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::static_transforms::StaticTransforms;
 use strapd_recording::recording::topic_plan::TopicPlan;
-use strapd_recording::{Recording, Selection};
+use strapd_recording::{Input, Recording, Selection};
 
 /// Reads the rotation from the sensor to the frame `base` of the robot it is on.
 ///
@@ -21,14 +19,14 @@ use strapd_recording::{Recording, Selection};
 /// The recording cannot be read, has several sensors and none named, a sensor without a frame, or no way from it to
 /// the base.
 pub fn read(
-    path: &Path,
+    input: &Input,
     selection: &Selection,
     base: &str,
     pool: &Pool,
 ) -> Result<Quaternion<Body, Sensor>> {
-    let input = opening::open(path)?;
+    let path = input.name();
     let topic = selection.topic.as_deref();
-    let log = Recording::told_apart(&input, topic, &selection.decode, pool)?;
+    let log = Recording::told_apart(input, topic, &selection.decode, pool)?;
     let refused = |what: Diagnostic| Error::from(strapd_recording::Error::unsupported(path, what));
     let names = log.choose(path, topic)?.topics;
     let [name] = names.as_slice() else {

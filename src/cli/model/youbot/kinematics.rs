@@ -48,12 +48,18 @@ struct Tolerance {
     angle: f64,
 }
 
+/// Most by which two orientations of one pose may differ, entry by entry: what six decimals keep.
+const SAME: f64 = 2e-6;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Inverse {
     p: [f64; 3],
     r: Option<[[f64; 3]; 3]>,
     quat: Option<Wxyz>,
+    /// Part of an answer of `fk`, which may be a request as it is; changes nothing.
+    #[serde(rename = "within_limits")]
+    _within_limits: Option<bool>,
     #[serde(default)]
     policy: PolicyName,
     tolerance: Option<Tolerance>,
@@ -68,10 +74,14 @@ pub(super) struct Inverse {
 
 pub(super) fn inverse(request: &Inverse, unit: Unit) -> Answer {
     let setting = Setting::new(request.preset, request.joints, unit);
-    let rotation = match (request.r, request.quat) {
-        (Some(r), None) => Dcm::assume(Matrix3::from_fn(|i, j| r[i][j])),
-        (None, Some(quat)) => quat.dcm()?,
-        _ => return Err("exactly one of these is needed: r, quat".to_owned().into()),
+    let rows = request.r.map(|r| Matrix3::from_fn(|i, j| r[i][j]));
+    let quat = request.quat.map(|quat| quat.dcm()).transpose()?;
+    let rotation = match (rows, quat) {
+        (Some(rows), Some(quat)) if (rows - quat.as_matrix()).amax() <= SAME => Dcm::assume(rows),
+        (Some(_), Some(_)) => return Err("r and quat are two orientations".to_owned().into()),
+        (Some(rows), None) => Dcm::assume(rows),
+        (None, Some(quat)) => quat,
+        (None, None) => return Err("one of these is needed: r, quat".to_owned().into()),
     };
     let policy = policy(request, unit)?;
     let current = request.q_current.map(|q| setting.read(q)).transpose()?;
