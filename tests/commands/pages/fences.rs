@@ -8,6 +8,9 @@ pub(super) struct Block {
     /// The word behind it.
     pub(super) language: String,
     pub(super) text: String,
+    /// Commands that are not run, by their number in the block from 1, and why: what a comment of HTML, which no reader
+    /// sees, says before the fence, `<!-- untested 2, 3: needs a board -->`.
+    pub(super) untested: Vec<(usize, String)>,
 }
 
 /// A command of a block: a line, or several that belong together.
@@ -27,7 +30,15 @@ pub(super) struct Command {
 pub(super) fn blocks(page: &str) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     let mut is_open = false;
+    let mut before = Vec::new();
     for (n, line) in page.lines().enumerate() {
+        if let (false, Some(said)) = (is_open, line.strip_prefix("<!-- untested ")) {
+            let said = said.strip_suffix(" -->").and_then(|s| s.split_once(": "));
+            let (numbers, why) = said.unwrap_or_else(|| panic!("line {}: {line}", n + 1));
+            let numbers = numbers.split(", ").map(|n| n.parse().unwrap());
+            before.extend(numbers.map(|n: usize| (n, why.to_owned())));
+            continue;
+        }
         if let Some(language) = line.strip_prefix("```") {
             is_open = !is_open;
             if is_open {
@@ -35,6 +46,7 @@ pub(super) fn blocks(page: &str) -> Vec<Block> {
                     line: n + 1,
                     language: language.to_owned(),
                     text: String::new(),
+                    untested: std::mem::take(&mut before),
                 });
             }
         } else if is_open && let Some(block) = blocks.last_mut() {
@@ -43,13 +55,13 @@ pub(super) fn blocks(page: &str) -> Vec<Block> {
         }
     }
     assert!(!is_open, "a fence is left open");
+    assert_eq!(before, [], "of no fence");
     blocks
 }
 
 /// The commands of a block. A line that ends in `\` goes on in the next, and `for` as far as `done`.
 pub(super) fn commands(block: &Block) -> Vec<Command> {
     let mut commands: Vec<Command> = Vec::new();
-    let mut rest_untested = None;
     let mut is_whole = true;
     for (n, line) in block.text.lines().enumerate() {
         let (text, comment) = match line.find("# ") {
@@ -58,11 +70,7 @@ pub(super) fn commands(block: &Block) -> Vec<Command> {
             }
             _ => (line.trim_end(), ""),
         };
-        let reason = comment
-            .split_once("untested: ")
-            .map(|(_, why)| why.to_owned());
         if text.is_empty() {
-            rest_untested = reason.or(rest_untested);
             continue;
         }
         let code = comment
@@ -70,11 +78,14 @@ pub(super) fn commands(block: &Block) -> Vec<Command> {
             .and_then(|(_, rest)| rest.chars().next()?.to_digit(10))
             .map_or(0, |code| i32::try_from(code).unwrap());
         if is_whole {
+            let number = commands.len() + 1;
+            let mut untested = block.untested.iter();
+            let untested = untested.find(|(of, _)| *of == number);
             commands.push(Command {
                 line: block.line + n + 1,
                 text: String::new(),
                 code: 0,
-                untested: rest_untested.clone(),
+                untested: untested.map(|(_, why)| why.clone()),
             });
         }
         let command = commands.last_mut().unwrap();
@@ -83,11 +94,12 @@ pub(super) fn commands(block: &Block) -> Vec<Command> {
         }
         command.text.push_str(text);
         command.code = command.code.max(code);
-        command.untested = command.untested.take().or(reason);
         let mut words = command.text.split(|c: char| c.is_whitespace() || c == ';');
         is_whole = !text.ends_with('\\')
             && (!command.text.starts_with("for ") || words.any(|word| word == "done"));
     }
+    let most = block.untested.iter().map(|(number, _)| *number).max();
+    assert!(most <= Some(commands.len()), "{block:?}: no such command");
     commands
 }
 
@@ -112,7 +124,7 @@ impl Command {
 
 #[test]
 fn a_block_is_cut_into_its_commands_with_what_their_comments_say() {
-    let page = "text\n```sh\na -o x.csv   # plain; exit code 3: why\nb \\\n  --c > y  # untested: no b here\n\n# untested: the rest\nfor i in 1; do\n  d '#1'\ndone\n```\n```json\n{}\n```\n";
+    let page = "text\n<!-- untested 2: no b here -->\n<!-- untested 3: the rest -->\n```sh\na -o x.csv   # plain; exit code 3: why\nb \\\n  --c > y\n\n# the rest\nfor i in 1; do\n  d '#1'\ndone\n```\n```json\n{}\n```\n";
     let all = blocks(page);
     assert_eq!(
         all.iter().map(|b| &*b.language).collect::<Vec<_>>(),
@@ -128,7 +140,7 @@ fn a_block_is_cut_into_its_commands_with_what_their_comments_say() {
             "for i in 1; do\n  d '#1'\ndone"
         ]
     );
-    assert_eq!([found[0].line, found[1].line, found[2].line], [3, 4, 8]);
+    assert_eq!([found[0].line, found[1].line, found[2].line], [5, 6, 10]);
     assert_eq!(found.iter().map(|c| c.code).collect::<Vec<_>>(), [3, 0, 0]);
     let reasons: Vec<Option<&str>> = found.iter().map(|c| c.untested.as_deref()).collect();
     assert_eq!(reasons, [None, Some("no b here"), Some("the rest")]);
