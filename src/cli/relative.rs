@@ -156,13 +156,17 @@ fn chart(found: &Joint) -> Chart {
         look,
         color: Some(color),
     };
-    let mut all = vec![series(0, "angle", SeriesStyle::Line, 1)];
+    let mut all = Vec::new();
+    if found.rows.iter().any(|row| row.sigma.is_some()) {
+        let mut band = series(2, "3 sigma", SeriesStyle::Band, 1);
+        let above = traces.points(3, 1e9).into_iter().rev();
+        band.points.extend(above);
+        band.points.retain(|[_, y]| y.is_finite());
+        all.push(band);
+    }
+    all.push(series(0, "angle", SeriesStyle::Line, 1));
     if found.heading == RelativeHeading::Hinge {
         all.push(series(1, "off the axis", SeriesStyle::Thin, 2));
-    }
-    if found.rows.iter().any(|row| row.sigma.is_some()) {
-        all.push(series(2, "3 sigma", SeriesStyle::Thin, 0));
-        all.push(series(3, "", SeriesStyle::Thin, 0));
     }
     Chart {
         title: "Angle from the first instant".to_owned(),

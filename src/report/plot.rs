@@ -85,6 +85,8 @@ pub enum SeriesStyle {
     Marked,
     /// Points alone.
     Dots,
+    /// A pale area: its points run along one side and back along the other.
+    Band,
 }
 
 /// A chart that could not be drawn.
@@ -236,8 +238,12 @@ impl Chart {
             let pieces: &[(i32, i32)] = match series.look {
                 SeriesStyle::Line | SeriesStyle::Thin | SeriesStyle::Marked => &[(0, 24)],
                 SeriesStyle::Dashed => &[(0, 6), (9, 15), (18, 24)],
-                SeriesStyle::Dots => &[],
+                SeriesStyle::Dots | SeriesStyle::Band => &[],
             };
+            if series.look == SeriesStyle::Band {
+                let area_of_it = Rectangle::new([(0, y - 5), (24, y + 5)], pale(color));
+                area.draw(&area_of_it).map_err(say)?;
+            }
             for (from, to) in pieces {
                 let line = PathElement::new([(*from, y), (*to, y)], color.stroke_width(2));
                 area.draw(&line).map_err(say)?;
@@ -313,6 +319,10 @@ impl Chart {
                         let dashes = DashedLineSeries::new(points(), 6, 4, style);
                         chart.draw_series(dashes).map_err(say)?;
                     }
+                    SeriesStyle::Band => {
+                        let outline = Polygon::new(points().collect::<Vec<_>>(), pale(color));
+                        chart.draw_series([outline]).map_err(say)?;
+                    }
                     SeriesStyle::Dots => {}
                 }
                 if matches!(series.look, SeriesStyle::Marked | SeriesStyle::Dots) {
@@ -328,6 +338,11 @@ impl Chart {
         }
         Ok(())
     }
+}
+
+/// A colour through which what lies behind is seen.
+fn pale(color: RGBColor) -> ShapeStyle {
+    color.mix(0.22).filled()
 }
 
 /// Ranges in which one unit is equally long along both axes of a picture of the given size.
@@ -389,6 +404,28 @@ mod tests {
             "three points, one in the legend"
         );
         assert_eq!(svg, chart().svg().unwrap(), "the same bytes again");
+    }
+
+    #[test]
+    fn a_band_is_an_area_behind_the_line_with_its_name() {
+        let mut chart = chart();
+        let (low, high) = (
+            [[500.0, 1e-10], [2000.0, 1e-13]],
+            [[2000.0, 1e-12], [500.0, 1e-8]],
+        );
+        let band = Series {
+            name: "3 sigma".to_owned(),
+            points: [low, high].concat(),
+            look: SeriesStyle::Band,
+            color: None,
+        };
+        chart.series.insert(0, band);
+        let svg = chart.svg().unwrap();
+        let area = svg.find("<polygon").unwrap();
+        assert_eq!(svg.matches("<polygon").count(), 1);
+        assert!(svg[area..].contains("<circle"), "behind the line: {svg}");
+        assert!(svg.contains("3 sigma"));
+        assert!(svg[area..].contains("opacity=\"0.22\""), "{svg}");
     }
 
     #[test]
