@@ -1,6 +1,7 @@
 """Joint angle of a simulated leg with exact truth: strapd, and the toolbox qmt with VQF.
 
     python benches/peers/knee.py --strapd target/release/strapd --seeds 1 2 3        # needs numpy, scipy; vqf and qmt for the peer
+    python benches/peers/knee.py --strapd target/release/strapd --seconds 20 --play 3 --plot docs/pictures/knee.svg       # the picture of docs/joint.md
 
 Thigh and shank at 1 kHz, the sensors worn in any direction and read as means at 100 Hz; bias 0.3 deg/s, white noise 0.05 deg/s,
 accelerometer 0.02 m/s^2 of bias and of noise; still for three seconds at both ends. Degrees, root mean square and largest over all
@@ -60,12 +61,16 @@ def error(angle, truth):
     return min((e - e.mean() for e in errors), key=lambda e: np.abs(e).mean())
 
 
+def replayed(at, binary, tables, flags):
+    for name, table in tables.items():
+        np.savetxt(at / f"{name}.csv", table, delimiter=",", header=HEAD, comments="", fmt="%.9g")
+        subprocess.run([binary, "replay", f"{name}.csv", "-q", "-o", f"{name}.mcap", *flags], cwd=at, check=True)
+
+
 def by_strapd(binary, tables, truth, flags):
     with tempfile.TemporaryDirectory() as folder:
         at = pathlib.Path(folder)
-        for name, table in tables.items():
-            np.savetxt(at / f"{name}.csv", table, delimiter=",", header=HEAD, comments="", fmt="%.9g")
-            subprocess.run([binary, "replay", f"{name}.csv", "-q", "-o", f"{name}.mcap", *flags], cwd=at, check=True)
+        replayed(at, binary, tables, flags)
         subprocess.run([binary, "relative", "thigh.mcap", "shank.mcap", "-q", "-o", "knee.csv"], cwd=at, check=True)
         rows = np.genfromtxt(at / "knee.csv", delimiter=",", names=True)
     at_row = np.rint(rows["stamp_ns"] * 1e-9 * RATE).astype(int) - 1
@@ -102,8 +107,14 @@ def main():
     parser.add_argument("--seconds", type=float, default=120.0)
     parser.add_argument("--play", type=float, default=0.0)
     parser.add_argument("--no-qmt", action="store_true")
+    parser.add_argument("--plot", type=pathlib.Path, metavar="FILE.svg", help="draw the first seed's angle, and compare nothing")
     args = parser.parse_args()
     binary = str(pathlib.Path(args.strapd).resolve())
+    if args.plot:
+        with tempfile.TemporaryDirectory() as folder:
+            replayed(pathlib.Path(folder), binary, leg(args.seeds[0], args.seconds, args.play)[0], ["--smooth"])
+            relative = [binary, "relative", "thigh.mcap", "shank.mcap", "-q", "--force", "--plot", args.plot.resolve()]
+            return subprocess.run(relative, cwd=folder, check=True)
     show = lambda e: f"{np.sqrt((e**2).mean()):.2f} rms {np.abs(e).max():.2f} most"  # noqa: E731
     for seed in args.seeds:
         tables, truth = leg(seed, args.seconds, args.play)
