@@ -90,20 +90,15 @@ fn estimate_by<E>(
     if plan.smooth {
         topic.spool_beside(&[]);
     }
-    let (estimator, output) = (&mut topic.estimator, &mut topic.output);
     for (n, raw) in samples.enumerate() {
-        estimator.take(&raw);
-        if !raw.is_beside {
-            topic
-                .zeros
-                .take(raw.gyro.map(|gyro| topic.resolved.rates(gyro)));
-        }
+        let _ = topic.take(&raw);
         if (n + 1).is_multiple_of(BLOCK) {
-            let attitudes = estimator.attitudes(&Sequential);
-            output.add(attitudes);
+            let attitudes = topic.estimator.attitudes(&Sequential);
+            topic.output.add(attitudes);
             take(attitudes).map_err(Stop::Ended)?;
         }
     }
+    let (estimator, output) = (&mut topic.estimator, &mut topic.output);
     let attitudes = estimator.attitudes(&Sequential);
     output.add(attitudes);
     take(attitudes).map_err(Stop::Ended)?;
@@ -229,6 +224,38 @@ mod tests {
             written,
             last.as_ref(),
         )
+    }
+
+    /// Codes of what is found in `rates` of a lively motion.
+    fn found(rate: impl Fn(f64) -> [f64; 3]) -> Vec<String> {
+        let raw = (0..6000_i64).map(|n| {
+            let stamp = Nanos(1_700_000_000_000_000_000 + n * 10_000_000);
+            RawSample {
+                header: Some(stamp),
+                log: stamp,
+                gyro: Some(rate(n as f64 * 0.01)),
+                ..RawSample::default()
+            }
+        });
+        let plan = EstimationSettings::default();
+        let summary = estimate(&plan, raw, |_| Ok::<(), ()>(())).unwrap();
+        let found = summary.findings.iter();
+        found.map(|f| f.code.to_owned()).collect()
+    }
+
+    #[test]
+    fn an_axis_that_hangs_is_found_in_samples_of_a_program_as_in_a_file() {
+        let lively = |t: f64| [(3.0 * t).sin(), (2.3 * t).cos(), 0.5 * (1.7 * t).sin()];
+        let hung = |t: f64| {
+            let [x, y, z] = lively(t);
+            [x, if (20.0..40.0).contains(&t) { 0.7 } else { y }, z]
+        };
+        assert!(!found(lively).contains(&"stuck".to_owned()));
+        assert!(
+            found(hung).contains(&"stuck".to_owned()),
+            "{:?}",
+            found(hung)
+        );
     }
 
     #[test]

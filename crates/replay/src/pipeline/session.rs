@@ -266,6 +266,24 @@ impl Topic {
         })
     }
 
+    /// Takes a sample: into the estimator, and before the watches over its sensor. Whether it is time to look at what
+    /// is known by it.
+    pub(super) fn take(&mut self, raw: &RawSample) -> bool {
+        self.watch(raw);
+        let is_due = self.warming.note(raw);
+        self.estimator.take(raw);
+        if raw.is_beside {
+            return is_due;
+        }
+        let rates = raw.gyro.map(|gyro| self.resolved.rates(gyro));
+        self.zeros.take(rates);
+        let is_rate = matches!(self.resolved.kind, SampleKind::Rate | SampleKind::Average);
+        if let Some(rates) = rates.filter(|_| is_rate) {
+            self.broken.push(&rates);
+        }
+        is_due
+    }
+
     /// Notes the stamp of a sample, and looks at its field.
     fn watch(&mut self, raw: &RawSample) {
         let Some(stamp) = self.prepared.clock.read(raw) else {
@@ -377,21 +395,11 @@ impl Session {
                 let Some(topic) = self.topics.get_mut(stream) else {
                     return Ok(false);
                 };
-                topic.watch(&raw);
-                is_due = topic.warming.note(&raw);
+                is_due = topic.take(&raw);
                 if raw.is_beside {
-                    topic.estimator.take(&raw);
                     return Ok(is_due);
                 }
                 self.samples += 1;
-                topic.estimator.take(&raw);
-                let rates = raw.gyro.map(|gyro| topic.resolved.rates(gyro));
-                topic.zeros.take(rates);
-                let kind = topic.resolved.kind;
-                let is_rate = matches!(kind, SampleKind::Rate | SampleKind::Average);
-                if let Some(rates) = rates.filter(|_| is_rate) {
-                    topic.broken.push(&rates);
-                }
                 if let Some(history) = &mut topic.history {
                     history.took(Some(&raw), &topic.estimator.conditioning().counts);
                 }
