@@ -381,7 +381,7 @@ mod tests {
         assert_eq!(read(rows).unwrap(), expected);
         assert_eq!(read(&format!("time,name\n{rows}")).unwrap(), expected);
         assert_eq!(
-            read(&format!("name;time\na;2023-11-14 22:13:20.5\n")).unwrap(),
+            read("name;time\na;2023-11-14 22:13:20.5\n").unwrap(),
             expected[..1]
         );
         let mixed = read("time\n2023-11-14T22:13:20Z\n1700000000\n").unwrap_err();
