@@ -417,6 +417,10 @@ impl Table {
             1.0 => vector,
             _ => vector.map(|v| v.map(|value| value * by)),
         };
+        let read = match self.whose {
+            Whose::Others => read.without_nulls(),
+            Whose::Own | Whose::OwnAttitudes => read,
+        };
         let gyro = scaled(self.whole(read.gyro, Column::Gyro)?, self.scales.gyro);
         let turn = self.whole(read.turn, Column::Turn)?;
         let gyro = gyro.or_else(|| turn.map(rotation_vector));
@@ -546,9 +550,29 @@ struct Read {
     turn: [Option<f64>; 4],
     matrix: [Option<f64>; 9],
     temperature: Option<f64>,
+    /// Numbers of gyro, accel and mag that a word says are not there.
+    nulls: [u8; 3],
 }
 
 impl Read {
+    /// Drops the vectors of which a word says that they are not there, in a row that has a number of another sensor:
+    /// joined tables have rows of each.
+    fn without_nulls(mut self) -> Read {
+        let mut vectors = [&mut self.gyro, &mut self.accel, &mut self.mag];
+        let is_there = |vector: &&mut [Option<f64>; 3]| {
+            let is_number = |value: &Option<f64>| value.is_some_and(|value| !value.is_nan());
+            vector.iter().all(is_number)
+        };
+        if vectors.iter().any(is_there) {
+            for (vector, nulls) in vectors.iter_mut().zip(self.nulls) {
+                if nulls == 3 {
+                    **vector = [None; 3];
+                }
+            }
+        }
+        self
+    }
+
     #[inline]
     fn take(
         &mut self,
@@ -580,6 +604,9 @@ impl Read {
                 Column::Temperature => number(text).ok(),
                 _ => Some(number(text)?),
             };
+            if is_null(text) {
+                self.count_null(column);
+            }
             return Ok(());
         }
         match column {
@@ -604,6 +631,16 @@ impl Read {
             _ => {}
         }
         Ok(())
+    }
+
+    fn count_null(&mut self, column: Column) {
+        let [gyro, accel, mag] = &mut self.nulls;
+        match column {
+            Column::Gyro(_) => *gyro += 1,
+            Column::Accel(_) => *accel += 1,
+            Column::Mag(_) => *mag += 1,
+            _ => {}
+        }
     }
 
     /// Place of the number in a column, if the column holds plain numbers.
@@ -636,7 +673,12 @@ fn with_point<'b>(cell: &[u8], buffer: &'b mut [u8; MOST_DIGITS]) -> Option<&'b 
 
 /// Words for a number that is not there. Of a vector it is one that is not finite: it is counted, not passed over.
 fn is_absent(text: &str) -> bool {
-    ["null", "-", "NA", "N/A", "n/a", "None"].contains(&text) || text.eq_ignore_ascii_case("nan")
+    is_null(text) || text.eq_ignore_ascii_case("nan")
+}
+
+/// Words for no number, which is another thing than one that is none.
+fn is_null(text: &str) -> bool {
+    ["null", "-", "NA", "N/A", "n/a", "None"].contains(&text)
 }
 
 #[inline]

@@ -152,20 +152,20 @@ impl<'a, 'p> Seeker<'a, 'p> {
     ) -> Scan<()> {
         match self.meaning(key, twist) {
             Some(Meaning::Gyro { rank, unit }) if self.auto_gyro => {
-                found.names_gyro = true;
+                found.names_gyro |= !self.is_null();
                 if let Some(v) = self.vector(1, found)? {
                     found.gyro(rank, unit, None, v);
                 }
             }
             Some(Meaning::DeltaAngle) if self.auto_gyro => {
-                found.names_gyro = true;
+                found.names_gyro |= !self.is_null();
                 if let Some(v) = self.vector(1, found)? {
                     let unit = Some(crate::decode::GyroUnit::Rad);
                     found.gyro(1, unit, Some(SampleKind::DeltaAngle), v);
                 }
             }
             Some(Meaning::GyroAxis { axis, rank, unit }) if self.auto_gyro => {
-                found.names_gyro = true;
+                found.names_gyro |= !self.is_null();
                 if let Some(value) = self.scanner.float()? {
                     found.gyro_axis(axis, rank, unit, value);
                 }
@@ -229,6 +229,11 @@ impl<'a, 'p> Seeker<'a, 'p> {
             _ => self.other(key, depth, found)?,
         }
         Ok(())
+    }
+
+    /// Whether the value is `null`, which is as if its key were not there.
+    fn is_null(&mut self) -> bool {
+        self.scanner.peek() == Some(b'n')
     }
 
     fn meaning(&self, key: &str, twist: bool) -> Option<Meaning> {

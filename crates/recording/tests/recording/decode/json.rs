@@ -142,6 +142,44 @@ fn null_is_absent_and_pythons_nan_is_not_finite() {
 }
 
 #[test]
+fn null_is_as_if_its_key_were_not_there() {
+    let decoder = LineDecoder::default().with_besides();
+    let read = |text: &str| {
+        let mut samples = Vec::new();
+        let line = decoder.decode(text.as_bytes(), Nanos(7), &mut samples);
+        (format!("{:?}", line.unwrap()), samples)
+    };
+    for (null, without) in [
+        (
+            r#"{"t":0.1,"gyro":null,"accel":[0,0,9.8]}"#,
+            r#"{"t":0.1,"accel":[0,0,9.8]}"#,
+        ),
+        (
+            r#"{"t":0.1,"gx":null,"gy":null,"gz": null,"mag":{"x":1,"y":2,"z":3}}"#,
+            r#"{"t":0.1,"mag":{"x":1,"y":2,"z":3}}"#,
+        ),
+        (
+            r#"{"t":0.1,"gyro":[1,2,3],"accel":null,"mag":null}"#,
+            r#"{"t":0.1,"gyro":[1,2,3]}"#,
+        ),
+        (
+            r#"[{"t":0.1,"gyro":null,"accel":[0,0,9.8]}]"#,
+            r#"[{"t":0.1,"accel":[0,0,9.8]}]"#,
+        ),
+    ] {
+        let (line, samples) = read(null);
+        assert_eq!((&line, &samples), (&read(without).0, &read(without).1));
+        assert_eq!(samples.len(), 1, "{null}");
+        assert_eq!(samples[0].is_beside, samples[0].gyro.is_none(), "{null}");
+    }
+    // A rate that is there in part is one that is lost.
+    for part in ["[null,1,2]", "[null,null,null]"] {
+        let (_, samples) = read(&format!(r#"{{"t":0.1,"gyro":{part},"accel":[0,0,9.8]}}"#));
+        assert!(!samples[0].is_beside, "{part}");
+    }
+}
+
+#[test]
 fn quaternions_are_taken_by_name_and_never_from_a_bare_array() {
     let decoder = decoder("");
     let read = |text: &str| decode_one(&decoder, text.as_bytes()).orientation;

@@ -157,6 +157,25 @@ fn a_unit_of_stamps_that_the_steps_deny_is_not_believed_and_one_that_is_not_said
 }
 
 #[test]
+fn words_for_no_number_are_as_empty_cells_where_another_sensor_has_numbers() {
+    let read = |gyro: &str| {
+        let rows = (0..20).map(|k| format!("0.{k:02}1,1,2,3,,,\n0.{k:02}5,{gyro},0,0,9.8\n"));
+        let rows: String = rows.collect();
+        let head = "time_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n";
+        let given = given(&format!("{head}{rows}"));
+        assert_eq!(given.bad, []);
+        given.samples
+    };
+    let empty = read(",,");
+    assert_eq!(empty.iter().filter(|sample| sample.is_beside).count(), 20);
+    for words in ["null,null,null", "NA,NA,NA", "-,-,-"] {
+        assert_eq!(read(words), empty, "{words}");
+    }
+    // What is not finite is a sample that is lost, and counted.
+    assert!(read("NaN,NaN,NaN").iter().all(|sample| !sample.is_beside));
+}
+
+#[test]
 fn rows_that_are_none_are_counted_with_their_lines_and_the_others_are_read() {
     let given = given(
         "time_s,gyro_x,gyro_y,gyro_z\n0.00,x,2,3\n0.01,1,2,3\n0.02,1,2\n0.03,1,2,3,4\n0.04,1,2,three\n0.05,,2,3\n,1,2,3\n0.07,nan,-,null\n0.08,1,2,3,\n0.09,1,\u{1b}[2J,3\n",
