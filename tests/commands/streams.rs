@@ -1,7 +1,7 @@
 //! Promise: what must not change the result changes no bit of it: threads, speed, the form of the
 //! output, and the way the samples came in.
 
-use crate::made_logs::{motion, written};
+use crate::made_logs::{ImuSample, bytes, imu_message, logged, motion, written};
 use crate::replays::{Bits, csv, fixture, mcap, ndjson, replay_of, target};
 use assert_cmd::Command;
 use std::io::Write;
@@ -91,6 +91,22 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
         fixture("constant_rate_ros1.mcap"),
         fixture("coning_average.mcap"),
     ] {
+        same_every_way(&log, dir.path());
+    }
+}
+
+/// Stamps of zero, and of a clock that stands: the log time takes over, and has to come through the pipe.
+#[test]
+fn a_recording_whose_stamps_are_no_clock_gives_the_same_attitudes_through_lines_and_rows() {
+    let dir = tempfile::tempdir().unwrap();
+    for stamp in [0, 1_600_000_000_000_000_000] {
+        let samples = motion(3000);
+        let mut messages = logged("/imu", &samples);
+        for (message, sample) in messages.iter_mut().zip(samples) {
+            message.payload = imu_message("imu_link", &ImuSample { stamp, ..sample });
+        }
+        let log = dir.path().join("stands.mcap");
+        std::fs::write(&log, bytes(None, 4096, &messages)).unwrap();
         same_every_way(&log, dir.path());
     }
 }

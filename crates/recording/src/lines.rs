@@ -69,7 +69,10 @@ impl<R: Read> Lines<R> {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
             format,
-            form: Form::Objects(LineDecoder::new(options).with_besides(), Numbers::default()),
+            form: Form::Objects(
+                LineDecoder::new(options).with_besides().with_log_times(),
+                Numbers::default(),
+            ),
             last_read: 0,
             current: 0,
             offset: 0,
@@ -131,7 +134,7 @@ impl<R: Read> Lines<R> {
                 numbers.decode(&self.line, samples)
             }
             Form::Objects(decoder, numbers) => {
-                // A line has no time but the one in it.
+                // A line has no times but those in it.
                 let line = decoder.decode(&self.line, Nanos(0), samples);
                 line.and_then(|line| numbers.learn(&line, &self.line).map(|()| line))
             }

@@ -15,6 +15,10 @@ pub(in crate::cli) fn rate(id: &str, seq: u64, raw: &RawSample, kind: Option<Sam
     };
     if let Some(map) = object.as_object_mut() {
         let mut put = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        // The clock that is used where the stamps are of none.
+        if raw.header.is_some_and(|header| header != raw.log) {
+            put("log_ns", json!(raw.log.0));
+        }
         for (key, vector) in [("gyro", raw.gyro), ("accel", raw.accel), ("mag", raw.mag)] {
             if let Some(vector) = vector {
                 put(key, json!(vector));

@@ -38,6 +38,8 @@ pub(crate) struct Seeker<'a, 'p> {
     pub(crate) class: Option<Cow<'a, str>>,
     pub(crate) id: Option<Cow<'a, str>>,
     pub(crate) seq: Option<u64>,
+    /// Log time, ns.
+    pub(crate) log: Option<i64>,
     pub(crate) kind: Option<Cow<'a, str>>,
     /// The sensor the outermost object is of, named there or assumed.
     pub(crate) sensor: Option<Cow<'a, str>>,
@@ -60,6 +62,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             class: None,
             id: None,
             seq: None,
+            log: None,
             kind: None,
             sensor: None,
         }
@@ -286,6 +289,10 @@ impl<'a, 'p> Seeker<'a, 'p> {
             }
             ("seq", Some(b'0'..=b'9')) if depth == 0 => {
                 self.seq = self.scanner.number()?.and_then(|n| n.parse().ok());
+                Ok(())
+            }
+            ("log_ns", Some(b'-' | b'0'..=b'9')) if depth == 0 => {
+                self.log = self.scanner.number()?.and_then(|n| n.parse().ok());
                 Ok(())
             }
             (_, Some(b'{' | b'[')) => self.inside(None, depth, key == "twist", found),

@@ -69,6 +69,7 @@ impl Line {
 #[derive(Debug, Clone, Default)]
 pub struct LineDecoder {
     plan: Program,
+    takes_log: bool,
 }
 
 impl LineDecoder {
@@ -77,6 +78,7 @@ impl LineDecoder {
     pub fn new(options: &Options) -> Self {
         LineDecoder {
             plan: Program::compile("", options),
+            takes_log: false,
         }
     }
 
@@ -93,6 +95,13 @@ impl LineDecoder {
     #[must_use]
     pub fn with_besides(mut self) -> Self {
         self.plan.takes_besides = true;
+        self
+    }
+
+    /// The same of lines that were kept: their log time is the one they state (`log_ns`), if they do.
+    #[must_use]
+    pub(crate) fn with_log_times(mut self) -> Self {
+        self.takes_log = true;
         self
     }
 
@@ -150,7 +159,9 @@ impl LineDecoder {
         };
         let id = seeker.id.as_deref().map(exact_name).transpose()?;
         let mut bare = Vec::new();
-        let decoded = self.plan.push(&found, received, received, out, &mut bare);
+        let kept = seeker.log.filter(|_| self.takes_log).map(Nanos);
+        let log = kept.unwrap_or(received);
+        let decoded = self.plan.push(&found, log, log, out, &mut bare);
         Ok(Line {
             class,
             id,
