@@ -464,6 +464,44 @@ fn a_zip_of_a_phones_folder_gives_the_bits_of_the_folder() {
     }
 }
 
+/// Table as MATLAB writes a timetable of its phone logs: local dates, to the millisecond.
+fn matlab(rows: &[Row], by: f64) -> String {
+    let mut text = "Timestamp,X,Y,Z\n".to_owned();
+    for (stamp, v) in rows {
+        let [x, y, z] = v.map(|value| value * by);
+        let ms = (stamp - rows[0].0) / 1_000_000;
+        let (minute, second) = (ms / 60_000, ms % 60_000);
+        let clock = format!("10:{minute:02}:{:02}.{:03}", second / 1000, second % 1000);
+        writeln!(text, "28-Oct-2026 {clock},{x},{y},{z}").unwrap();
+    }
+    text
+}
+
+#[test]
+fn a_folder_of_matlabs_phone_logs_is_one_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let phone = phone(at);
+    let folder = at.join("matlab");
+    std::fs::create_dir(&folder).unwrap();
+    let put = |name: &str, text: String| std::fs::write(folder.join(name), text).unwrap();
+    put("AngularVelocity.csv", matlab(&phone.rates, 1.0));
+    put("Acceleration.csv", matlab(&phone.forces, 1.0));
+    put("MagneticField.csv", matlab(&phone.fields, 1e6));
+    // Azimuth, pitch and roll, which are not read.
+    put("Orientation.csv", matlab(&phone.fields, 1.0));
+    let (_, ran) = replayed(at, "matlab", "--aid gravity+mag -v");
+    let said = format!("{}{}", ran.done().out, ran.err);
+    for words in [
+        "Acceleration.csv",
+        "MagneticField.csv",
+        "gravity and field",
+        "lost     nothing",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
 #[test]
 #[cfg_attr(not(has_python), ignore = "needs python3")]
 fn what_a_phone_says_of_its_own_orientation_is_found_in_its_folder_and_its_zip() {

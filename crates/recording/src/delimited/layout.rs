@@ -427,7 +427,7 @@ impl Opening {
             .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
         {
             return Diagnostic::new(
-                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)",
+                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope... or AngularVelocity)",
             )
             .help(format!(
                 "{COLUMNS} gyro=x:y:z if they are rates"

@@ -26,10 +26,14 @@ impl DateOrder {
         let mut is_month_first = false;
         let mut is_day_first = false;
         for date in dates {
-            let (numbers, separator) = numbers(date)?;
+            let (numbers, separator, middle) = numbers(date)?;
             let [first, second, _] = numbers;
             if first > 31 {
                 found = Some((DateOrder::YearMonthDay, true));
+                continue;
+            }
+            if middle == Middle::Name {
+                found = Some((DateOrder::DayMonthYear, true));
                 continue;
             }
             is_day_first |= first > 12;
@@ -51,7 +55,7 @@ impl DateOrder {
 
     /// Midnight of a date, UTC.
     pub(super) fn midnight(self, date: &str) -> Option<Nanos> {
-        let ([a, b, c], _) = numbers(date)?;
+        let ([a, b, c], ..) = numbers(date)?;
         let (year, month, day) = match self {
             DateOrder::YearMonthDay => (a, b, c),
             DateOrder::MonthDayYear => (c, a, b),
@@ -64,20 +68,57 @@ impl DateOrder {
     }
 }
 
-/// The three numbers of a date, and what stands between them.
-fn numbers(date: &str) -> Option<([i64; 3], char)> {
+/// Form of what stands in the middle of a date.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Middle {
+    Number,
+    /// Name of a month, `28-Nov-2026`, as MATLAB writes dates.
+    Name,
+}
+
+/// Number of a month by its English name, or the first three letters of it.
+fn month(name: &str) -> Option<i64> {
+    const MONTHS: [&str; 12] = [
+        "january",
+        "february",
+        "march",
+        "april",
+        "may",
+        "june",
+        "july",
+        "august",
+        "september",
+        "october",
+        "november",
+        "december",
+    ];
+    let name = name.to_ascii_lowercase();
+    let is_it = |month: &&str| **month == *name || month.get(..3) == Some(&name);
+    let numbered = (1..).zip(MONTHS);
+    numbered
+        .into_iter()
+        .find_map(|(n, month)| is_it(&month).then_some(n))
+}
+
+/// The three numbers of a date, what stands between them, and whether the one in the middle is written as a name.
+fn numbers(date: &str) -> Option<([i64; 3], char, Middle)> {
     let separator = date.chars().find(|c| !c.is_ascii_digit())?;
     if !['-', '/', '.'].contains(&separator) {
         return None;
     }
     let mut out = [0; 3];
+    let mut middle = Middle::Number;
     let mut parts = date.split(separator);
-    for number in &mut out {
+    for (place, number) in out.iter_mut().enumerate() {
         let part = parts.next()?;
+        if let (1, Some(named)) = (place, month(part)) {
+            (*number, middle) = (named, Middle::Name);
+            continue;
+        }
         let is_plain = (1..=4).contains(&part.len()) && part.bytes().all(|b| b.is_ascii_digit());
         *number = part.parse().ok().filter(|_| is_plain)?;
     }
-    parts.next().is_none().then_some((out, separator))
+    parts.next().is_none().then_some((out, separator, middle))
 }
 
 /// A time of day, `1:59:50.02` or `01:59:50 PM`, since midnight; a leap second is the one after.
@@ -122,8 +163,15 @@ pub(super) fn since_midnight(text: &str) -> Option<Nanos> {
 
 /// The date and the time of a cell that holds both.
 pub(super) fn date_and_time(cell: &str) -> Option<(&str, &str)> {
-    let (date, time) = cell.trim().split_once(['T', 't', ' ', ',', ';'])?;
-    Some((date, time.trim_start()))
+    let cell = cell.trim();
+    // Behind a digit: `Oct` has a t, too.
+    let mut before = ' ';
+    let (at, _) = cell.char_indices().find(|(_, c)| {
+        let ends_date = before.is_ascii_digit() && ['T', 't', ' ', ',', ';'].contains(c);
+        before = *c;
+        ends_date
+    })?;
+    Some((cell.get(..at)?, cell.get(at + 1..)?.trim_start()))
 }
 
 /// Origin of the days.
@@ -261,6 +309,24 @@ mod tests {
             None
         );
         assert_eq!(of(&["1.5"]), None);
+        // As MATLAB writes dates: the name of the month tells the order.
+        for date in ["03-Apr-2026", "3-april-26", "03/Apr/2026", "03.APR.2026"] {
+            assert_eq!(of(&[date]), Some((DateOrder::DayMonthYear, true)), "{date}");
+            let day = DateOrder::DayMonthYear.midnight(date);
+            assert_eq!(day, Some(Nanos(1_775_174_400 * SECOND)), "{date}");
+        }
+        assert_eq!(of(&["2026-Apr-03"]), Some((DateOrder::YearMonthDay, true)));
+        for none in ["03-Avr-2026", "Apr-03-2026", "03-Ap-2026", "03-Apr"] {
+            assert_eq!(of(&[none]), None, "{none}");
+        }
+        assert_eq!(
+            date_and_time("03-Oct-2026 10:00:00.123"),
+            Some(("03-Oct-2026", "10:00:00.123"))
+        );
+        assert_eq!(
+            date_and_time("03-Oct-2026T10:00:00"),
+            Some(("03-Oct-2026", "10:00:00"))
+        );
         assert_eq!(of(&["-0.25"]), None);
         // `date -u -d 2025-03-30 +%s`.
         let day = Some(Nanos(1_743_292_800 * SECOND));

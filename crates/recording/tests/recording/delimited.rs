@@ -5,6 +5,7 @@
 
 mod bad_tables;
 mod increments;
+mod phones;
 
 use std::fmt::Write;
 use std::io::Read;

@@ -114,16 +114,23 @@ pub(super) fn candidates(names: &[Name], kind: Kind) -> Vec<Group> {
     groups.into_values().filter_map(group).collect()
 }
 
-/// Sensor Logger and its like: bare axes beside a stamp are what a file of that name holds.
+/// Sensor Logger and its like: bare axes beside a stamp are what a file of that name holds. MATLAB's phone logs have
+/// the second name, and no other word in it: what is called so and more is another thing.
 pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<usize>> {
-    let stems: &[&str] = match kind {
-        Kind::Gyro => &["gyroscope"],
-        Kind::Accel => &["totalacceleration", "accelerometer"],
-        Kind::Mag => &["magnetometer"],
-        Kind::Orientation | Kind::Matrix | Kind::Turn | Kind::Push => &[],
+    let (stems, whole): (&[&str], &str) = match kind {
+        Kind::Gyro => (&["gyroscope"], "angularvelocity"),
+        Kind::Accel => (&["totalacceleration", "accelerometer"], "acceleration"),
+        Kind::Mag => (&["magnetometer"], "magneticfield"),
+        Kind::Orientation | Kind::Matrix | Kind::Turn | Kind::Push => return None,
     };
     let stem = stem.to_lowercase();
-    stems.iter().find(|of_kind| stem.starts_with(*of_kind))?;
+    let is_whole = stem
+        .strip_prefix(whole)
+        .is_some_and(|rest| !rest.contains(char::is_alphabetic));
+    let is_it = is_whole || stems.iter().any(|of_kind| stem.starts_with(of_kind));
+    if !is_it {
+        return None;
+    }
     names.iter().find(|name| name.meant == Meant::Stamp)?;
     let axis = |axis: &str| place(names, axis).ok();
     ["x", "y", "z"].into_iter().map(axis).collect()
