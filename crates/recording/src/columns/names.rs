@@ -241,6 +241,8 @@ const TIMES_OF_DAY: &[&str] = &[
     "utcdatetime",
     "localdatetime",
     "recordedat",
+    // Of SensorLog.
+    "loggingtime",
 ];
 const DATES: &[&str] = &[
     "date",

@@ -230,6 +230,15 @@ impl Unit {
         }
     }
 
+    /// Unit as it is said where nobody gave it: by its name, if with the sign changed.
+    pub(crate) fn said(self) -> Option<String> {
+        let turned = self.times(-1.0);
+        let name = |unit: Unit| unit.name();
+        name(self)
+            .map(str::to_owned)
+            .or_else(|| Some(format!("{}*-1", name(turned)?)))
+    }
+
     /// Name in `--columns`; `None` of one that has no name.
     pub(crate) fn name(self) -> Option<&'static str> {
         match self {

@@ -6,6 +6,7 @@
 mod increments;
 mod instants;
 mod roles;
+mod sensor_log;
 mod sensors;
 
 use super::column::{Column, is_comment};

@@ -60,6 +60,8 @@ const FINE_MICROS: f64 = 5e3;
 /// A counter of packets has 16 bits, a fine time 32.
 const COUNTER_WIDTH: i64 = 1 << 16;
 const FINE_WIDTH: i64 = 1 << 32;
+/// Nanoseconds of a second.
+const SECOND: f64 = 1e9;
 /// Number of steps that is too small to tell a unit against the one that the name states.
 const FEW: usize = 4;
 
@@ -84,6 +86,9 @@ impl Roles<'_> {
             .any(|role| self.given_of(*role).is_some());
         if let Some(split) = self.split_second().filter(|_| !is_asked) {
             return Ok(self.of_stamp(Stamp::of_split(split)));
+        }
+        if let Some(at) = self.stamp_beside().filter(|_| !is_asked) {
+            return Ok(self.of_stamp(self.stamp(at, Some(Unit::Time(SECOND)))?));
         }
         let each = self.names.iter().enumerate();
         let is_stamp =

@@ -312,7 +312,7 @@ impl Roles<'_> {
                     .map(|at| self.reference(*at))
                     .collect();
                 let given = self.given_of(Role::Of(kind)).and_then(|given| given.unit);
-                let named = || chosen.unit.and_then(Unit::name).map(str::to_owned);
+                let named = || chosen.unit.and_then(Unit::said);
                 said.extend(given.map(Unit::stated).or_else(named));
                 assumed.push(format!("{}={}", kind.name(), said.join(":")));
             }
@@ -421,6 +421,7 @@ impl Roles<'_> {
         if groups.len() > 1 {
             groups.retain(|group| group.columns.iter().all(|at| !self.is_empty(*at)));
         }
+        self.keep_mended(kind, &mut groups);
         let [group] = groups.as_slice() else {
             if groups.is_empty() {
                 self.say_aside(kind, notes);
@@ -478,7 +479,7 @@ impl Roles<'_> {
             )));
         }
         Ok(match (&first.unit, kind) {
-            (Some(Ok(unit)), _) => Some(Some(*unit)),
+            (Some(Ok(unit)), _) => Some(Some(self.upward(kind, columns, *unit))),
             (Some(Err(unit)), Kind::Gyro) => {
                 return Err(Diagnostic::new(format!(
                     "the unit `{unit}` of its rates is not known"
