@@ -516,7 +516,7 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
         return Ok(());
     }
     let text = match global.verbose {
-        0 => format!("{}{}", summary.brief(), next(summary)),
+        0 => format!("{}{}", summary.brief(), next(summary, args.join)),
         _ => summary.text(),
     };
     if global.json || writes_stdout(args) {
@@ -527,11 +527,17 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
     print(&text)
 }
 
+const NOTHING_NEXT: &str = "  next     -v prints all of this summary\n";
+
 /// Line about what to do next.
-fn next(summary: &RunSummary) -> String {
+fn next(summary: &RunSummary, is_joined: bool) -> String {
     if Path::new(&summary.source) == Source::Stdin.name() {
         // It is gone: there is nothing that a command could read again.
-        return "  next     -v prints all of this summary\n".to_owned();
+        return NOTHING_NEXT.to_owned();
+    }
+    // No other command takes several files as one recording.
+    if is_joined {
+        return NOTHING_NEXT.to_owned();
     }
     let log = strapd_replay::shell::quoted(OsString::from(&summary.source));
     let has_more = summary.is_lossy() || summary.topics.iter().any(|t| !t.warnings().is_empty());

@@ -245,3 +245,63 @@ fn a_part_that_holds_nothing_is_left_out_with_a_word() {
     strapd(at, "replay --join killed.mcap begun.mcap -o no.ndjson")
         .refused(1, &["nothing in it has a time"]);
 }
+
+/// Rows of half a minute at rest under this header, by a tenth of a second from `from` on.
+fn table(at: &Path, name: &str, head: &str, from: u32, row: &str) {
+    let rows = (0..300).map(|k| format!("{},{row}\n", from + 100 * k));
+    fs::write(
+        at.join(name),
+        format!("{head}\n{}", rows.collect::<String>()),
+    )
+    .unwrap();
+}
+
+#[test]
+fn recordings_of_two_devices_are_refused_with_what_tells_them_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let rad = "time_ms,gyro_x (rad/s),gyro_y (rad/s),gyro_z (rad/s),acc_x (m/s^2),acc_y (m/s^2),acc_z (m/s^2)";
+    table(at, "a.csv", rad, 0, "0,0,0.1,0,0,9.81");
+    table(at, "b.csv", rad, 30_000, "0,0,0.1,0,0,9.81");
+    let deg = "time_ms,gx (deg/s),gy (deg/s),gz (deg/s)";
+    table(at, "deg.csv", deg, 30_000, "0,0,5.73");
+    let other = "time_ms,w_x (rad/s),w_y (rad/s),w_z (rad/s),a_x (m/s^2),a_y (m/s^2),a_z (m/s^2)";
+    table(at, "other.csv", other, 30_000, "0,0,0.1,0,0,9.81");
+    let joined = |second: &str| {
+        strapd(
+            at,
+            &format!("replay --join a.csv {second} -o out.csv --force"),
+        )
+    };
+    joined("deg.csv").refused(
+        1,
+        &[
+            "deg.csv: imu is in deg, without accelerations here and in rad and m/s^2 in a.csv",
+            "one device",
+            "without --join",
+        ],
+    );
+    // One device may write other columns from some day on: that is said, and no more.
+    let ran = joined("other.csv");
+    assert!(ran.done().err.contains("w_x (rad/s)"), "{ran:?}");
+    assert!(ran.err.contains("two devices"), "{ran:?}");
+    // Nothing is said of one device, and no command is named that would not run.
+    let ran = joined("b.csv");
+    assert_eq!(
+        (ran.done().err.as_str(), ran.out.contains("and 1 more' ")),
+        ("", false),
+        "{ran:?}"
+    );
+    let cameras =
+        ["gopro_hero6.raw", "gopro_fusion.raw"].map(|name| fixture(name).display().to_string());
+    let cameras = cameras.join(" ");
+    strapd(at, &format!("replay --join {cameras} -o out.csv --force")).refused(
+        1,
+        &[
+            "gopro/imu is from `",
+            "` here and from `",
+            "one device",
+            "without --join",
+        ],
+    );
+}

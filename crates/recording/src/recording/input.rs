@@ -25,6 +25,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::setting::JOIN;
 
 /// Bytes of a stream that are kept at most.
 pub(super) const MOST: u64 = 8 << 30;
@@ -271,7 +272,9 @@ impl Input {
                         first.display(),
                         Format::name(*other)
                     ))
-                    .help("strapd recover makes an MCAP of a log"),
+                    .help(format!(
+                        "name them without {JOIN}: each has an attitude of its own; of logs of one device strapd recover makes MCAPs"
+                    )),
                 });
             }
             formats.push((path.clone(), format));

@@ -14,6 +14,7 @@ use crate::text::{named_few, printable};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::record::AccelUnit;
 use strapd_attitude::setting::JOIN;
 
 /// A clock that differs so much between two files is another clock, s: what is less is a recorder that wrote two files
@@ -94,9 +95,7 @@ fn said_of_border(
                 "{secs:.3} s of it are in {} too: recordings of the same time do not continue each other",
                 shown(a)
             ))
-            .help(format!(
-                "name one of them: each by itself is read without {JOIN}"
-            )),
+            .help(apart()),
         ));
     }
     if common > 0 {
@@ -191,19 +190,27 @@ impl Whole {
             let Some(of) = same.clone().next() else {
                 continue;
             };
-            if !same.any(|of| is_continued(of, known)) {
+            let Some(of) = same.find(|of| is_continued(of, known)) else {
                 return refuse(
                     Diagnostic::new(format!(
-                        "{} is {} here and {} in {}: parts of one recording have the same types",
+                        "{} is {}: parts of one recording are of one device",
                         printable(topic),
-                        meant(known),
-                        meant(of),
-                        printable(&before)
+                        unlike(known, of, &printable(&before))
                     ))
-                    .help(format!(
-                        "name one of them: each by itself is read without {JOIN}"
-                    )),
+                    .help(apart()),
                 );
+            };
+            let columns = |known: &LogChannel| Some(known.stated.as_ref()?.description.clone());
+            if let (Some(here), Some(there)) = (columns(known), columns(of))
+                && here != there
+            {
+                self.warn.say(&format!(
+                    "{}: {} is {here} here and {there} in {}: where they are of two devices, {}",
+                    printable(&name.display().to_string()),
+                    printable(topic),
+                    printable(&before),
+                    apart()
+                ));
             }
         }
         let [here, there] = [channels, &self.channels].map(imus);
@@ -223,9 +230,7 @@ impl Whole {
                     printable(&before),
                     named_few(&there)
                 ))
-                .help(format!(
-                    "name one of them: each by itself is read without {JOIN}"
-                ))
+                .help(apart())
             );
         }
         self.warn.say(&format!(
@@ -244,16 +249,55 @@ fn imus(channels: &[LogChannel]) -> Vec<&str> {
     topics.map(|known| known.channel.topic.as_str()).collect()
 }
 
-/// A channel's type; of rows and lines also in which unit they are.
-fn meant(known: &LogChannel) -> String {
-    let of_text = known.stated.as_ref().map(|stated| {
-        let unit = stated
-            .declared
-            .gyro_unit
-            .map_or("no unit", |unit| unit.name());
-        format!(" ({}; {unit})", stated.description)
-    });
-    described(&known.channel).to_string() + &of_text.unwrap_or_default()
+/// Cure of what are two recordings.
+fn apart() -> String {
+    format!("name one of them, or several without {JOIN}: each has an attitude of its own")
+}
+
+/// Difference between a channel of a part and the one that it does not continue: of what is alike nothing is said.
+fn unlike(known: &LogChannel, of: &LogChannel, before: &str) -> String {
+    let [a, b] = [known, of].map(|known| described(&known.channel).to_string());
+    if a != b {
+        return format!("{a} here and {b} in {before}");
+    }
+    let [a, b] = [known, of].map(|known| publisher(&known.channel));
+    if a != b {
+        let name = |text: String| match text.is_empty() {
+            true => "a device without a name".to_owned(),
+            false => format!("`{text}`"),
+        };
+        return format!("from {} here and from {} in {before}", name(a), name(b));
+    }
+    let [a, b] = [known, of].map(units);
+    if a != b {
+        return format!("in {a} here and in {b} in {before}");
+    }
+    let meant = |known: &LogChannel| {
+        known
+            .stated
+            .as_ref()
+            .map(|stated| stated.description.clone())
+    };
+    let [a, b] = [known, of].map(|known| meant(known).unwrap_or_default());
+    match a == b {
+        true => format!("defined otherwise here than in {before}"),
+        false => format!("{a} here and {b} in {before}"),
+    }
+}
+
+/// Units of a channel's rates and forces.
+fn units(known: &LogChannel) -> String {
+    let Some(stated) = known.stated.as_ref() else {
+        return "no unit".to_owned();
+    };
+    let gyro = stated.declared.gyro_unit;
+    let gyro = gyro.map_or("no unit", |unit| unit.name());
+    match (stated.declared.accel_unit, stated.has_accel) {
+        (Some(AccelUnit::MetresPerSecondSquared), _) => format!("{gyro} and m/s^2"),
+        (Some(AccelUnit::StandardGravity), _) => format!("{gyro} and g"),
+        (None, true) => format!("{gyro}, accelerations in no unit"),
+        (None, false) => format!("{gyro}, without accelerations"),
+    }
 }
 
 /// Whether a channel of a later part is this one: the same publisher, topic and type, and numbers that mean the same.
