@@ -9,6 +9,7 @@ mod many;
 mod mixed;
 mod orientation;
 mod recordings;
+mod set_clocks;
 
 use std::path::Path;
 use strapd::pipeline::check::{Examination, examine};

@@ -11,7 +11,7 @@ use serde_json::json;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 use strapd_attitude::estimate::KindReason;
 use strapd_attitude::record::SampleKind;
-use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND};
+use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND, TIME};
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
@@ -48,6 +48,11 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         return;
     };
     let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
+    if topic.looked.clock_set.is_some() && topic.looked.quality.with_orientation == 0 {
+        out.push(of_another_clock());
+        out.extend(meaning_unknown(summary));
+        return;
+    }
     if let Some(what) = resets(recorded.resets) {
         let note = Finding::new(Severity::Note, "orientation-reset", what);
         out.push(note.with("resets", recorded.resets));
@@ -62,6 +67,17 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         let at_rest = topic.looked.bias.as_ref().map(|found| found.bias.0);
         told_by_it(summary, recorded, at_rest, out);
     }
+}
+
+/// Finding of orientations on a topic of their own, beside samples whose clock was set.
+fn of_another_clock() -> Finding {
+    Finding::new(
+        Severity::Note,
+        "no-reference",
+        "the recorded orientation has stamps of its own, of which the steps of the clock are not taken off",
+    )
+    .advise("it is not compared; on the recorder's clock it can be")
+    .help([TIME.to("log")])
 }
 
 /// Findings of a replay about the orientation it was compared with: nothing of its bias if that is no truth.

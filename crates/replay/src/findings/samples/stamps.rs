@@ -130,6 +130,8 @@ pub(super) fn drift(seen: &Seen<'_>, out: &mut Vec<Finding>) {
     let ppm = q.offset.map_or(0.0, |offset| offset.drift_ppm);
     // The wrong speed of a clock is no drift.
     let is_wrong = seen.looked.clocks.of_speed.is_some();
+    // Nor is a step, which was taken off.
+    let is_wrong = is_wrong || seen.looked.clock_set.is_some();
     if q.duration_secs >= 60.0 && ppm.abs() > DRIFT_PPM && !is_wrong {
         out.push(
             Finding::new(
