@@ -8,6 +8,8 @@
 //! Reading -> blocks (20 ms, bias of rest) -> segment (4 s: scatter of gravity under a map) -> bank (evidence) -> refine
 //! where no map of the bank explains it -> finer (unit and axes at once, factors of single axes, a turned gyro)
 //! segments in order -> change (other axes from one moment on)
+//! segments in order -> bias_change (another bias from one moment on)
+//! blocks in order -> leap (both sensors in other axes from one moment on)
 //! ```
 //!
 //! The bank runs only where gravity wanders as recorded, which healthy sensors do not let it do. Memory is bounded, and
@@ -16,10 +18,13 @@
 //! Theory, thresholds and what cannot be seen: `docs/theory/consistency.md`.
 
 mod bank;
+mod bias_change;
 mod blocks;
 mod change;
+mod euler;
 mod field;
 mod finer;
+mod leap;
 mod refine;
 mod segment;
 #[cfg(test)]
@@ -27,11 +32,15 @@ mod tests;
 
 pub use self::bank::CHIPS;
 use self::bank::{Answer, BANK, DEGREE, Evidence, OF_UNIT, Verdict};
+pub use self::bias_change::BiasChange;
+use self::bias_change::BiasWatch;
 use self::blocks::{Block, Blocks, Rest, Step};
 pub use self::change::AxesChange;
 use self::change::Sound;
 pub use self::field::{FieldConsistency, FieldDisagreement, FieldIron, FieldReading};
 use self::finer::Finer;
+pub use self::leap::GravityLeap;
+use self::leap::Leaps;
 use self::refine::refine;
 use self::segment::{SEGMENT_SECS, Segment};
 use crate::frames::AxisMap;
@@ -116,6 +125,8 @@ pub enum Cause {
         /// Largest standard deviation about an axis, rad.
         sigma: f64,
     },
+    /// Rates that are derivatives of roll, pitch and yaw.
+    EulerRates,
     /// Lack of rates: gravity turns, and the gyro reads next to nothing.
     Unturned,
     /// Unknown, since no map explains it: the rates are wrong, or gravity stays with the body.
@@ -161,6 +172,8 @@ pub struct Consistency {
     /// Axes that are others from one moment on, and how often in a row they were seen.
     change: Option<AxesChange>,
     change_held: usize,
+    leaps: Leaps,
+    biases: BiasWatch,
     /// Whether it runs beside a stream without an end: it keeps no segment that does not scatter, and closes a bank
     /// that finds nothing.
     is_live: bool,
@@ -188,6 +201,8 @@ impl Default for Consistency {
             sound: Sound::default(),
             change: None,
             change_held: 0,
+            leaps: Leaps::default(),
+            biases: BiasWatch::default(),
             is_live: false,
             moved: 0,
         }
@@ -225,6 +240,19 @@ impl Consistency {
     #[must_use]
     pub fn axes_change(&self) -> Option<AxesChange> {
         self.change.filter(|_| self.change_held >= HOLD)
+    }
+
+    /// Leap of gravity in one sample that the gyro does not read: from there on both sensors are in other axes.
+    #[must_use]
+    pub fn gravity_leap(&self) -> Option<GravityLeap> {
+        self.leaps.found()
+    }
+
+    /// Bias of the gyro that is another from one moment on, in a recording; `None` where axes or a scale are wrong, too.
+    #[must_use]
+    pub fn bias_change(&self) -> Option<BiasChange> {
+        let is_judged = self.settled.is_none() && self.finer.is_none() && self.change.is_none();
+        self.biases.found().filter(|_| is_judged)
     }
 
     /// Takes the next reading; one without numbers is passed over.
@@ -276,6 +304,7 @@ impl Consistency {
                 },
                 verdict.found,
             )),
+            Answer::EulerRates => Some((Cause::EulerRates, verdict.found)),
             Answer::Unturned => Some((Cause::Unturned, verdict.found)),
             Answer::Contradiction => None,
         };
@@ -339,6 +368,7 @@ impl Consistency {
         }
         self.rest.push(&block, gravity);
         self.run.push(block);
+        self.leaps.look(&self.run, gravity);
         let Some(start) = self.run.first().map(|first| first.start) else {
             return;
         };
@@ -370,6 +400,10 @@ impl Consistency {
             return;
         }
         let scatter = self.identity.push(&segment, |_| true).as_recorded();
+        if let Some(found) = self.identity.last.filter(|_| !self.is_live) {
+            let taken = bias.unwrap_or_else(Vector3::zeros);
+            self.biases.push(&segment, taken, found);
+        }
         if scatter <= GATE_SCATTER {
             self.sound.push(&self.run, &segment, gravity, bias);
         }

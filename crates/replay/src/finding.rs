@@ -11,13 +11,18 @@ pub(crate) const MIXED: &str = "two-sensors";
 pub(crate) const GYRO_UNIT_CHANGE: &str = "gyro-unit-change";
 pub(crate) const ACCEL_UNIT_CHANGE: &str = "accel-unit-change";
 pub(crate) const GYRO_AXES_CHANGE: &str = "gyro-axes-change";
+pub(crate) const GYRO_BIAS_CHANGE: &str = "gyro-bias-change";
+pub(crate) const GRAVITY_LEAP: &str = "gravity-leap";
+/// Code of rates that are derivatives of roll, pitch and yaw.
+pub(crate) const GYRO_EULER_RATES: &str = "gyro-euler-rates";
 /// Code of a gyro that reads nothing where gravity turns.
 pub(crate) const GYRO_DEAD: &str = "gyro-dead";
 /// Code of what a stage said of how it read or prepared the data, and has no name of its own.
 pub(crate) const AS_READ: &str = "preparation";
 /// Codes of a sensor that is read in wrong axes, by a wrong factor or in a wrong unit: the data show the right one.
-const MISREAD: [&str; 7] = [
+const MISREAD: [&str; 8] = [
     GYRO_DEAD,
+    GYRO_EULER_RATES,
     "gyro-axes",
     "gyro-scale",
     "gyro-turned",
@@ -103,7 +108,13 @@ impl Finding {
 
     /// Whether the attitude is wrong by more than its sigma, which knows nothing of it.
     pub(crate) fn is_beyond_sigma(&self) -> bool {
-        let no_sensor = [MIXED, GYRO_UNIT_CHANGE, ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE];
+        let no_sensor = [
+            MIXED,
+            GYRO_UNIT_CHANGE,
+            ACCEL_UNIT_CHANGE,
+            GYRO_AXES_CHANGE,
+            GRAVITY_LEAP,
+        ];
         let is_no_sensor = no_sensor.contains(&self.code);
         self.severity == Severity::Error && (is_no_sensor || self.is_misread())
     }

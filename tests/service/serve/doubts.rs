@@ -78,7 +78,7 @@ type Fault = (
     &'static str,
 );
 
-const FAULTS: [Fault; 26] = [
+const FAULTS: [Fault; 27] = [
     ("good", |_, _| {}, "", ""),
     ("absent", |_, s| s.gyro = [0.0; 3], "gyro-dead", ""),
     (
@@ -230,6 +230,18 @@ const FAULTS: [Fault; 26] = [
             }
         },
         "accel-unit-change",
+        "",
+    ),
+    (
+        "both in other axes half way",
+        |n, s| {
+            if n >= 1100 {
+                s.gyro = [s.gyro[0], s.gyro[2], -s.gyro[1]];
+                s.accel = [s.accel[0], s.accel[2], -s.accel[1]];
+                s.mag = [s.mag[0], s.mag[2], -s.mag[1]];
+            }
+        },
+        "gravity-leap",
         "",
     ),
     (

@@ -3,7 +3,8 @@
 //! A stage of its own because it is a rule of evidence: what is said must hold in nearly all segments, be seen to be
 //! better than no rotation at all, and stand by a residual as small as that of healthy sensors.
 
-use super::segment::Segment;
+use super::euler::UPS;
+use super::segment::{Scatter, Segment};
 use crate::median::median;
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Vector3};
@@ -72,6 +73,9 @@ const UNTURNED: f64 = 0.1;
 /// Least scatter of the identity, g; where physics makes gravity turn less than the body.
 const LEAST_IDENTITY: f64 = 0.05;
 pub(super) const LEAST_IDENTITY_LESS: f64 = 0.09;
+/// Least scatter of the force in the body, g, by which roll and pitch are told from the lean of a curve: 0.35 to 0.59 of
+/// hands, arms and what tumbles, 0.06 at most of cars.
+const LEAST_TURNS: f64 = 0.2;
 /// A factor below this is a unit.
 const UNIT_BELOW: f64 = 0.1;
 /// Rate as recorded, rad/s, that is beyond the range of nearly every gyro of three axes (2000 deg/s are 35 rad/s, 4000
@@ -159,6 +163,10 @@ pub(super) struct Row {
     is_beyond: bool,
     /// Whether the gyro turned by next to nothing.
     is_unturned: bool,
+    /// Scatter of rates that are derivatives of roll, pitch and yaw.
+    of_euler: [f64; UPS.len()],
+    /// Scatter of the force in the body, g.
+    force_scatter: f64,
     /// Beginning and end of the segment.
     span: (Nanos, Nanos),
 }
@@ -174,6 +182,13 @@ impl Row {
         let of = |h: usize| self.of.get(h).copied().unwrap_or(f64::NAN) + FLOOR;
         evidence(of(0), of(h))
     }
+
+    /// Evidence for derivatives of roll, pitch and yaw against the identity.
+    fn evidence_of_euler(&self, up: usize) -> f64 {
+        let identity = self.of.first().copied().unwrap_or(f64::NAN);
+        let found = self.of_euler.get(up).copied().unwrap_or(f64::NAN);
+        evidence(identity + FLOOR, found + FLOOR)
+    }
 }
 
 /// Bias and scatter of some hypotheses, segment after segment.
@@ -182,6 +197,8 @@ pub(super) struct Residuals {
     normal: Vec<Matrix3<f64>>,
     slope: Vec<Vector3<f64>>,
     count: usize,
+    /// Scatter of the last segment under the first hypothesis.
+    pub(super) last: Option<Scatter<3>>,
 }
 
 impl Residuals {
@@ -190,6 +207,7 @@ impl Residuals {
             normal: vec![Matrix3::zeros(); hypotheses],
             slope: vec![Vector3::zeros(); hypotheses],
             count: 0,
+            last: None,
         }
     }
 
@@ -205,6 +223,7 @@ impl Residuals {
         let prior = Matrix3::from_diagonal_element(1e-4 / segment.bias_sigma.powi(2));
         let sums = self.normal.iter_mut().zip(&mut self.slope);
         let (mut wanders, mut as_recorded) = (0.0, 0.0);
+        let last = &mut self.last;
         let of = sums
             .zip(BANK.iter())
             .enumerate()
@@ -221,6 +240,7 @@ impl Residuals {
                 let missing = (LEAST_GRAVITY - found.gravity).max(0.0);
                 let s = found.at(&bias).max(1e-8);
                 if h == 0 {
+                    *last = Some(found);
                     (wanders, as_recorded) = (s, s + missing * missing);
                 }
                 s + missing * missing
@@ -231,6 +251,8 @@ impl Residuals {
             wanders,
             is_beyond: segment.fastest() > BEYOND,
             is_unturned: segment.turned() < UNTURNED,
+            of_euler: [f64::NAN; UPS.len()],
+            force_scatter: segment.force_scatter(),
             span: segment.span,
         }
     }
@@ -246,6 +268,8 @@ pub(super) enum Answer {
     /// The recorded rates are faster than a gyro's, and in deg/s gravity stands still; how still, no factor near it
     /// changes.
     Degrees,
+    /// The rates are the derivatives of roll, pitch and yaw.
+    EulerRates,
     /// The gyro reads no rotation where gravity turns.
     Unturned,
     /// Lack of any map: no rotation at all makes gravity stand still as well.
@@ -274,6 +298,7 @@ pub(super) struct Verdict {
 #[derive(Clone, Debug)]
 pub(super) struct Evidence {
     residuals: Residuals,
+    of_euler: [Residuals; UPS.len()],
     rows: VecDeque<Row>,
     sums: Vec<f64>,
 }
@@ -287,6 +312,7 @@ impl Evidence {
     pub(super) fn of(hypotheses: usize) -> Evidence {
         Evidence {
             residuals: Residuals::new(hypotheses),
+            of_euler: UPS.map(|_| Residuals::new(1)),
             rows: VecDeque::new(),
             sums: vec![0.0; hypotheses],
         }
@@ -296,7 +322,14 @@ impl Evidence {
     pub(super) fn push(&mut self, segment: &Segment) {
         let (sums, is_whole) = (&self.sums, self.residuals.count.is_multiple_of(SELDOM));
         let judged = |h: usize| is_whole || sums[h] > HOPELESS;
-        let row = self.residuals.push(segment, judged);
+        let mut row = self.residuals.push(segment, judged);
+        let euler = self.of_euler.iter_mut().zip(UPS).zip(&mut row.of_euler);
+        for ((residuals, up), found) in euler {
+            *found = residuals
+                .push(&segment.of_euler_rates(up), |_| true)
+                .as_recorded()
+                .powi(2);
+        }
         for (h, sum) in self.sums.iter_mut().enumerate() {
             *sum += row.evidence(h);
         }
@@ -329,7 +362,50 @@ impl Evidence {
 
     /// Verdict by now; `None` where nothing may be said.
     pub(super) fn verdict(&self) -> Option<Verdict> {
-        self.verdict_from(0, &self.sums)
+        self.euler_rates()
+            .or_else(|| self.verdict_from(0, &self.sums))
+    }
+
+    /// Verdict that the rates are derivatives of roll, pitch and yaw: by the rule of the bank, and better than all of it.
+    fn euler_rates(&self) -> Option<Verdict> {
+        let sum =
+            |up: usize| -> f64 { self.rows.iter().map(|row| row.evidence_of_euler(up)).sum() };
+        let sums = (0..UPS.len()).map(|up| (up, sum(up)));
+        let (up, evidence) = sums.max_by(|(_, some), (_, other)| some.total_cmp(other))?;
+        let best = self.sums.iter().copied().fold(0.0, f64::max);
+        let stands_out = evidence - best >= (0.15 * evidence).max(4.0);
+        // In a curve the force tilts, and yaw about the tilted force leaves it where it is: as no rotation does.
+        let is_curve = self.sums.get(MAPS).is_none_or(|nothing| *nothing > 0.0);
+        if evidence < LEAST_EVIDENCE || !stands_out || is_curve {
+            return None;
+        }
+        let of = |row: &&Row| row.evidence_of_euler(up);
+        let telling: Vec<&Row> = self
+            .rows
+            .iter()
+            .filter(|row| of(row).abs() > TELLING)
+            .collect();
+        let agree = telling.iter().filter(|row| of(row) > 0.0).count();
+        let share = agree as f64 / telling.len().max(1) as f64;
+        let identity = median_scatter(telling.iter().map(|row| &row.wanders));
+        let found = median_scatter(telling.iter().filter_map(|row| row.of_euler.get(up)));
+        let mut turns: Vec<f64> = telling.iter().map(|row| row.force_scatter).collect();
+        let is_clear = telling.len() >= LEAST_SEGMENTS
+            && share >= LEAST_SHARE
+            && median(&mut turns) >= LEAST_TURNS
+            && identity >= LEAST_IDENTITY
+            && found <= LARGEST_FOUND
+            && found <= LARGEST_RATIO * identity;
+        is_clear.then_some(Verdict {
+            answer: Answer::EulerRates,
+            hypothesis: 0,
+            evidence,
+            identity,
+            recorded: identity,
+            found,
+            share,
+            segments: telling.len(),
+        })
     }
 
     /// Verdict about gravity that wanders as it does of no body that is moved about, where no map is clear.

@@ -160,6 +160,7 @@ fn explained(segments: &[&Segment], settled: &Verdict) -> Option<f64> {
         Answer::Factor | Answer::Degrees => {
             Some(refine::<4>(of, &map, &[Matrix3::identity()])?.left)
         }
+        Answer::EulerRates => Some(settled.found),
         Answer::Unturned | Answer::Contradiction => None,
     }
 }

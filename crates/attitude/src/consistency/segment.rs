@@ -6,6 +6,7 @@
 //! The derivation is in `docs/theory/consistency.md`.
 
 use super::blocks::Block;
+use super::euler::body_angles;
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, Vector3};
 use std::f64::consts::PI;
@@ -118,6 +119,22 @@ impl Segment {
         }
     }
 
+    /// The same where what was recorded are the derivatives of roll, pitch and yaw; `up` is the sign of the body's z that is
+    /// up where they are zero.
+    pub(super) fn of_euler_rates(&self, up: f64) -> Segment {
+        let steps: Vec<_> = self
+            .pieces
+            .iter()
+            .map(|piece| (piece.angle, piece.force))
+            .collect();
+        let angles = body_angles(&steps, up);
+        let taken = |(piece, angle): (&Piece, Vector3<f64>)| Piece { angle, ..*piece };
+        Segment {
+            pieces: self.pieces.iter().zip(angles).map(taken).collect(),
+            ..*self
+        }
+    }
+
     /// Whether the gyro turned, or the force changed, enough to say something.
     pub(super) fn moves(&self) -> bool {
         let (turned, scatter) = (self.turned(), self.force_scatter());
@@ -134,6 +151,12 @@ impl Segment {
     pub(super) fn fastest(&self) -> f64 {
         let pieces = self.pieces.iter();
         pieces.fold(0.0, |most, piece| most.max(piece.angle.norm() / piece.secs))
+    }
+
+    /// Mean force in the body, g.
+    pub(super) fn mean_force(&self) -> Vector3<f64> {
+        let sum: Vector3<f64> = self.pieces.iter().map(|piece| piece.force).sum();
+        sum / self.pieces.len().max(1) as f64
     }
 
     /// Scatter of the means of the force in the body, g.
@@ -221,7 +244,7 @@ fn weigh(pieces: &mut [Piece], middles: &[f64], k: usize) {
 const SHORT: f64 = 0.0064;
 
 /// Rotation by half of the vector.
-fn half_turn(angle: &Vector3<f64>) -> Quaternion<f64> {
+pub(super) fn half_turn(angle: &Vector3<f64>) -> Quaternion<f64> {
     let quarter = angle / 4.0;
     let square = quarter.norm_squared();
     let (cos, by) = if square <= SHORT {

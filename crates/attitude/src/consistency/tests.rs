@@ -137,6 +137,7 @@ fn the_bank_says_what_the_reference_says() {
             Answer::Map(decided) => ("map", decided),
             Answer::Factor | Answer::Degrees => ("factor", [false; 3]),
             Answer::Unturned => ("none", [false; 3]),
+            Answer::EulerRates => ("euler", [false; 3]),
             Answer::Contradiction => ("contradict", [false; 3]),
         };
         let seen = ["x", "y", "z"].into_iter().zip(seen).filter(|(_, is)| *is);
@@ -365,4 +366,83 @@ fn a_swing_in_degrees_is_told_by_rates_that_no_gyro_has() {
         "{found:?}"
     );
     assert_eq!(swing(1.0).disagreement(), None);
+}
+
+#[test]
+fn gravity_that_leaps_where_both_sensors_change_axes_is_named_with_the_moment_and_motion_is_no_leap()
+ {
+    let quarter = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
+    for walk in [0.0, 1.5] {
+        let samples = simulate(2000, walk);
+        assert_eq!(watched(&samples, &Matrix3::identity()).gravity_leap(), None);
+        let mounted_anew: Vec<Sample> = samples
+            .iter()
+            .enumerate()
+            .map(|(n, sample)| match n {
+                ..1003 => *sample,
+                _ => Sample {
+                    rate: quarter * sample.rate,
+                    force: quarter * sample.force,
+                    ..*sample
+                },
+            })
+            .collect();
+        let found = watched(&mounted_anew, &Matrix3::identity());
+        let leap = found.gravity_leap().unwrap();
+        let secs = leap.at.0 as f64 * 1e-9;
+        assert!((secs - 20.06).abs() < 0.05, "{leap:?}");
+        assert!((60.0..120.0).contains(&leap.angle.to_degrees()), "{leap:?}");
+        assert_eq!(leap.count, 1);
+        assert_eq!(found.disagreement(), None);
+    }
+}
+
+#[test]
+fn derivatives_of_roll_pitch_and_yaw_are_told_from_rates_of_the_body_whichever_side_is_up() {
+    let samples = simulate(2000, 0.5);
+    for up in [1.0, -1.0] {
+        let map = diagonal(1.0, up, up);
+        let angles: Vec<Sample> = samples
+            .iter()
+            .map(|sample| Sample {
+                rate: map * sample.angles,
+                force: map * sample.force,
+                ..*sample
+            })
+            .collect();
+        let found = watched(&angles, &Matrix3::identity())
+            .disagreement()
+            .unwrap();
+        assert_eq!(found.cause, Cause::EulerRates, "{found:?}");
+        assert!(found.cured < 0.3 * found.recorded, "{found:?}");
+    }
+    // About one axis they are the same.
+    assert_eq!(
+        watched(&roll_only(), &Matrix3::identity()).disagreement(),
+        None
+    );
+}
+
+#[test]
+fn a_bias_that_changes_is_named_with_its_size_and_a_constant_one_is_not() {
+    let by = Vector3::new(0.05, -0.04, 0.03);
+    for walk in [0.0, 1.0] {
+        let samples = simulate(4000, walk);
+        let biased = |from: usize| -> Vec<Sample> {
+            let all = samples.iter().enumerate();
+            all.map(|(n, sample)| Sample {
+                rate: sample.rate + if n < from { Vector3::zeros() } else { by },
+                ..*sample
+            })
+            .collect()
+        };
+        let of = |samples: &[Sample]| watched(samples, &Matrix3::identity()).bias_change();
+        assert_eq!(of(&samples), None);
+        assert_eq!(of(&biased(0)), None);
+        let change = of(&biased(2000)).unwrap();
+        let secs = change.at.0 as f64 * 1e-9;
+        assert!((secs - 40.0).abs() <= 4.0, "{change:?}");
+        assert!((change.by - by).norm() < 0.4 * by.norm(), "{change:?}");
+        assert!(change.cured < 0.7 * change.recorded, "{change:?}");
+    }
 }

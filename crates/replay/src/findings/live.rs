@@ -6,7 +6,10 @@
 use super::samples::{self, Seen};
 use super::{Finding, Severity, axes, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
-use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_DEAD, GYRO_UNIT_CHANGE, MIXED};
+use crate::finding::{
+    ACCEL_UNIT_CHANGE, GRAVITY_LEAP, GYRO_AXES_CHANGE, GYRO_DEAD, GYRO_EULER_RATES,
+    GYRO_UNIT_CHANGE, MIXED,
+};
 use crate::inspection::{Aids, Inspection};
 use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::{Clock, ClockSpeed, GyroUnit, SpeedPass};
@@ -16,7 +19,7 @@ use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::recording::payload_type::PayloadType;
 
 /// Codes of findings that stay true of a sensor until its settings change.
-const LASTING: [&str; 19] = [
+const LASTING: [&str; 21] = [
     GYRO_DEAD,
     "gyro-axes",
     "gyro-scale",
@@ -36,14 +39,17 @@ const LASTING: [&str; 19] = [
     GYRO_UNIT_CHANGE,
     ACCEL_UNIT_CHANGE,
     GYRO_AXES_CHANGE,
+    GRAVITY_LEAP,
+    GYRO_EULER_RATES,
 ];
 /// Codes of those about gyro and gravity.
-const OF_GYRO: [&str; 5] = [
+const OF_GYRO: [&str; 6] = [
     GYRO_DEAD,
     "gyro-axes",
     "gyro-scale",
     "gyro-turned",
     "gyro-against-gravity",
+    GYRO_EULER_RATES,
 ];
 /// Segments with a field after which it is judged after every fourth alone.
 const OFTEN: usize = 24;
@@ -246,6 +252,7 @@ impl SensorWatch {
         let changed = gyro.and_then(|gyro| stream::axes_changed(gyro, plan, first, true));
         let disagrees = || sensors::disagreement((gyro?, plan, resolved));
         now.extend(changed.or_else(disagrees));
+        now.extend(gyro.and_then(|gyro| stream::gravity_leap(gyro, first, true)));
         let is_sound = gyro.is_none_or(Consistency::agrees);
         if let Some(field) = estimator.field_consistency()
             && is_sound

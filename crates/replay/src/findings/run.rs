@@ -151,7 +151,16 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         stream::axes_changed(gyro, plan, noted.conditioning.first, false)
     });
     let disagrees = || noted.gyro.and_then(sensors::disagreement);
-    let of_gyro = changed.or_else(disagrees);
+    let leap = noted
+        .gyro
+        .and_then(|(gyro, ..)| stream::gravity_leap(gyro, noted.conditioning.first, false));
+    out.extend(leap);
+    let bias = || {
+        noted
+            .gyro
+            .and_then(|(gyro, ..)| stream::bias_changed(gyro, noted.conditioning.first))
+    };
+    let of_gyro = changed.or_else(bias).or_else(disagrees);
     // A gyro that is wrong against gravity turns against the field, too: the gyro is cured first.
     let is_gyro_sound = of_gyro.is_none() && noted.gyro.is_none_or(|(gyro, ..)| gyro.agrees());
     out.extend(of_gyro);

@@ -5,7 +5,7 @@
 
 use super::samples::COUNTS;
 use super::{Finding, Severity, axes};
-use crate::finding::GYRO_DEAD;
+use crate::finding::{GYRO_DEAD, GYRO_EULER_RATES};
 use crate::summary::significant;
 use nalgebra::Matrix3;
 use strapd_attitude::condition::GyroUnit;
@@ -66,6 +66,16 @@ pub(super) fn disagreement(
             (factor, sigma),
             (plan, resolved.unit),
         ),
+        Cause::EulerRates => Finding::new(
+            Severity::Error,
+            GYRO_EULER_RATES,
+            "gyro and accelerometer disagree: the rates are the derivatives of roll, pitch and yaw, not rates about the body's axes".to_owned(),
+        )
+        .with("scatter_cured_g", found.cured)
+        .advise(format!(
+            "{}; record the gyro itself, or make body rates of them first",
+            tried(found.recorded, found.cured, "the rates taken so")
+        )),
         Cause::Unturned => Finding::new(
             Severity::Error,
             GYRO_DEAD,
@@ -355,7 +365,10 @@ pub(super) fn settle(found: &mut Vec<Finding>) {
     if found.iter().any(|f| f.code == axes::DEAD) {
         found.retain(|f| f.code != axes::SILENT);
     }
-    let Some(cause) = found.iter().find(|f| [AXES, SCALE].contains(&f.code)) else {
+    let Some(cause) = found
+        .iter()
+        .find(|f| [AXES, SCALE, GYRO_EULER_RATES].contains(&f.code))
+    else {
         if found.iter().any(|f| f.evidence.contains_key(COUNTS)) {
             let others = ["unit-unknown", "gyro-against-gravity"];
             found.retain(|f| !others.contains(&f.code) && !BY_UNIT.contains(&f.code));

@@ -3,7 +3,9 @@
 //! Apart from the counts of a run because the advice depends on who reads it: a recording is split, a sender is mended.
 
 use super::{Finding, Severity, sensors};
-use crate::finding::{ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, GYRO_UNIT_CHANGE, MIXED};
+use crate::finding::{
+    ACCEL_UNIT_CHANGE, GRAVITY_LEAP, GYRO_AXES_CHANGE, GYRO_BIAS_CHANGE, GYRO_UNIT_CHANGE, MIXED,
+};
 use crate::summary::significant;
 use strapd_attitude::condition::{ACCEL_UNITS, Apart, GYRO_UNITS, Mixture, Report, UnitChange};
 use strapd_attitude::consistency::Consistency;
@@ -13,6 +15,8 @@ use strapd_attitude::setting::{COLUMNS, GYRO_AXES, GYRO_UNIT, START, TOPIC, UNTI
 
 /// Findings about gyro and gravity that these explain, beside those of a misread sensor.
 const EXPLAINED: [&str; 2] = ["gyro-against-gravity", "unit-against-gravity"];
+/// Findings that name the cause of a leap of gravity.
+const LEAPS: [&str; 4] = [MIXED, ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, "gyro-axes"];
 /// Ratio of two units by which readings change, less 1.
 const NEAR: f64 = 0.15;
 /// Findings from the report of a stream: of a recording, or live.
@@ -43,6 +47,9 @@ pub(super) fn settle(found: &mut Vec<Finding>) {
     let is_cause = |f: &Finding| causes.contains(&f.code);
     if found.iter().any(is_cause) {
         found.retain(|f| !f.is_misread() && !EXPLAINED.contains(&f.code));
+    }
+    if found.iter().any(|f| LEAPS.contains(&f.code)) {
+        found.retain(|f| f.code != GRAVITY_LEAP);
     }
 }
 
@@ -195,4 +202,78 @@ pub(super) fn axes_changed(
         true => finding.help([before]).help([behind, axes]),
         false => finding.help([before, axes]).help([behind]),
     })
+}
+
+/// Gravity that leaps where the gyro reads no rotation; `first`: stamp of the stream's first sample.
+pub(super) fn gravity_leap(
+    gyro: &Consistency,
+    first: Option<Nanos>,
+    is_live: bool,
+) -> Option<Finding> {
+    let leap = gyro.gravity_leap()?;
+    let at = first.map_or(0.0, |first| leap.at.secs_since(first));
+    let degrees = leap.angle.to_degrees();
+    let others = match leap.count {
+        1 => String::new(),
+        2 => ", and once more later".to_owned(),
+        n => format!(", and {} times more later", n - 1),
+    };
+    let finding = Finding::new(
+        Severity::Error,
+        GRAVITY_LEAP,
+        format!(
+            "gravity leaps by {degrees:.0} degrees in one sample {at:.1} s after the start{others}, and the gyro reads no such rotation"
+        ),
+    )
+    .with("at_s", at)
+    .with("angle_deg", degrees)
+    .with("scatter_g", leap.scatter)
+    .with("leaps", leap.count);
+    if is_live {
+        return Some(finding.advise("the sensor was mounted anew, or its sender restarted with other axes: the attitude is wrong until gravity pulls it back; reset it, and state the axes it has now"));
+    }
+    // The attitude begins anew in the second part.
+    let before = UNTIL.to(format!("{:.1}", (at - 0.1).max(0.0)));
+    let behind = START.to(format!("{:.1}", at + 0.1));
+    Some(
+        finding
+            .advise("the sensor was mounted anew or restarted with other axes, recordings were joined, or samples are missing: the attitude is wrong after it; take each part by itself")
+            .help([before])
+            .help([behind]),
+    )
+}
+
+/// Bias of the gyro that is another from one moment on; `first`: stamp of the recording's first sample.
+pub(super) fn bias_changed(gyro: &Consistency, first: Option<Nanos>) -> Option<Finding> {
+    let change = gyro.bias_change()?;
+    let at = first.map_or(0.0, |first| change.at.secs_since(first));
+    let by = change.by.map(f64::to_degrees);
+    let parts: Vec<String> = by.iter().map(|part| significant(*part, 2)).collect();
+    let sigma = significant(change.sigma.to_degrees().max(0.01), 1);
+    let (one, two) = (
+        significant(change.recorded, 2),
+        significant(change.cured, 1),
+    );
+    let part = |at: f64| format!("{:.0}", at.max(0.0));
+    Some(
+        Finding::new(
+            Severity::Warning,
+            GYRO_BIAS_CHANGE,
+            format!(
+                "the gyro's bias changes about {at:.0} s after the start by ({}) deg/s (+- {sigma})",
+                parts.join(", ")
+            ),
+        )
+        .with("at_s", at)
+        .with("by_deg_s", by.as_slice().to_vec())
+        .with("sigma_deg_s", change.sigma.to_degrees())
+        .with("scatter_g", change.recorded)
+        .with("scatter_cured_g", change.cured)
+        .with("segments", change.segments)
+        .advise(format!(
+            "gravity wanders by {one} g under one bias, by {two} g under two; the attitude drifts until the filter has learned the second: take each part by itself"
+        ))
+        .help([UNTIL.to(part(at))])
+        .help([START.to(part(at))]),
+    )
 }

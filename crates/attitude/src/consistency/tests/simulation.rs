@@ -6,11 +6,12 @@ use std::f64::consts::PI;
 const GRAVITY: f64 = 9.806_65;
 const HZ: f64 = 50.0;
 
-/// Rate in rad/s and specific force in m/s^2, body axes.
+/// Rate in rad/s and specific force in m/s^2, body axes, and the derivatives of roll, pitch and yaw, rad/s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sample {
     pub(super) rate: Vector3<f64>,
     pub(super) force: Vector3<f64>,
+    pub(super) angles: Vector3<f64>,
 }
 
 /// Numbers of mean 0 and deviation 1, uniform, from a 64-bit linear congruence.
@@ -60,6 +61,7 @@ pub(super) fn simulate(samples: usize, walk: f64) -> Vec<Sample> {
         Sample {
             rate: rate + of_rate * 0.1_f64.to_radians(),
             force: force + of_force * 0.03,
+            angles: Vector3::new(dr, dp, dy) + of_rate * 0.1_f64.to_radians(),
         }
     };
     (0..samples).map(sample).collect()
@@ -79,6 +81,7 @@ pub(super) fn roll_only() -> Vec<Sample> {
         Sample {
             rate: rate + of_rate * 0.1_f64.to_radians(),
             force: force + of_force * 0.03,
+            angles: rate,
         }
     };
     (0..2000).map(sample).collect()

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::finding::{GRAVITY_LEAP, GYRO_BIAS_CHANGE};
 use crate::pipeline::samples::estimate;
 use nalgebra::{Matrix3, Vector3};
 use strapd_attitude::estimate::settings::{Value, defaults, row};
@@ -22,6 +23,10 @@ fn widely() -> Vec<RawSample> {
 }
 
 fn moved(rms: f64, band: f64) -> Vec<RawSample> {
+    lasting(32, (rms, band))
+}
+
+fn lasting(secs: i64, (rms, band): (f64, f64)) -> Vec<RawSample> {
     let mut motion = BandLimited::random(3, rms, band, 6).unwrap();
     let step = 1_000_000_000 / RATE_HZ;
     let sample = |k: i64| {
@@ -39,7 +44,7 @@ fn moved(rms: f64, band: f64) -> Vec<RawSample> {
             ..RawSample::default()
         }
     };
-    (0..32 * RATE_HZ).map(sample).collect()
+    (0..secs * RATE_HZ).map(sample).collect()
 }
 
 fn by_gyro(samples: &[RawSample], map: &Matrix3<f64>) -> Vec<RawSample> {
@@ -61,6 +66,9 @@ fn found(samples: &[RawSample], given: &[Choice]) -> Vec<Finding> {
         AXES,
         SCALE,
         TURNED,
+        GYRO_EULER_RATES,
+        GRAVITY_LEAP,
+        GYRO_BIAS_CHANGE,
         "gyro-against-gravity",
         "unit-degrees",
         "under-sampled",
@@ -295,4 +303,91 @@ fn a_factor_of_which_only_the_order_of_size_is_known_is_no_error_unless_it_is_a_
     assert_eq!(severity(3.0, 0.07), Severity::Warning);
     assert_eq!(severity(0.02, 0.3), Severity::Error);
     assert_eq!(severity(2.0, 0.01), Severity::Error);
+}
+
+#[test]
+fn both_sensors_in_other_axes_are_a_leap_of_gravity_and_each_part_by_itself_is_none() {
+    let clean = clean();
+    let quarter = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
+    let (before, behind) = clean.split_at(903);
+    let turned = |v: [f64; 3]| (quarter * Vector3::from(v)).into();
+    let behind: Vec<RawSample> = behind
+        .iter()
+        .map(|raw| RawSample {
+            gyro: raw.gyro.map(turned),
+            accel: raw.accel.map(turned),
+            ..*raw
+        })
+        .collect();
+    let all = found(&[before, &behind].concat(), &[]);
+    let [leap] = all.as_slice() else {
+        unreachable!("{all:?}")
+    };
+    assert_eq!((leap.code, leap.severity), (GRAVITY_LEAP, Severity::Error));
+    assert!(leap.what.contains("18.1 s after the start"), "{leap:?}");
+    let help: Vec<String> = leap.help.iter().flatten().map(Choice::to_string).collect();
+    assert!(
+        help[0].ends_with("17.9") && help[1].ends_with("18.2"),
+        "{help:?}"
+    );
+    assert_eq!(found(before, &[]), []);
+    assert_eq!(found(&behind, &[]), []);
+}
+
+#[test]
+fn derivatives_of_angles_are_named_and_the_body_rates_of_the_same_motion_are_not() {
+    let step = 1_000_000_000 / RATE_HZ;
+    let of = |is_body: bool| -> Vec<RawSample> {
+        let sample = |k: i64| {
+            let t = k as f64 / RATE_HZ as f64;
+            let swing = |size: f64, w: f64| (size * (w * t).sin(), size * w * (w * t).cos());
+            let [(r, dr), (p, dp), (_, dy)] = [swing(0.8, 1.7), swing(0.7, 1.1), swing(2.0, 0.6)];
+            let ((sr, cr), (sp, cp)) = (r.sin_cos(), p.sin_cos());
+            let body = [dr - dy * sp, dp * cr + dy * cp * sr, dy * cp * cr - dp * sr];
+            RawSample {
+                header: Some(Nanos(k * step)),
+                log: Nanos(k * step),
+                gyro: Some(if is_body { body } else { [dr, dp, dy] }),
+                accel: Some([-sp, sr * cp, cr * cp].map(|share| share * 9.80665)),
+                ..RawSample::default()
+            }
+        };
+        (1..32 * RATE_HZ).map(sample).collect()
+    };
+    assert_eq!(found(&of(true), &[]), []);
+    let all = found(&of(false), &[]);
+    let [one] = all.as_slice() else {
+        unreachable!("{all:?}")
+    };
+    assert_eq!(
+        (one.code, one.severity),
+        (GYRO_EULER_RATES, Severity::Error)
+    );
+    assert!(one.advice.contains("g with the rates taken so"), "{one:?}");
+}
+
+#[test]
+fn a_bias_that_changes_is_named_and_each_part_by_itself_has_none() {
+    let clean = lasting(72, (0.8, 1.5));
+    assert_eq!(found(&clean, &[]), []);
+    let (before, behind) = clean.split_at(36 * RATE_HZ as usize);
+    let behind: Vec<RawSample> = behind
+        .iter()
+        .map(|raw| RawSample {
+            gyro: raw.gyro.map(|[x, y, z]| [x + 0.06, y - 0.05, z + 0.04]),
+            ..*raw
+        })
+        .collect();
+    let all = found(&[before, &behind].concat(), &[]);
+    let [one] = all.as_slice() else {
+        unreachable!("{all:?}")
+    };
+    assert_eq!(
+        (one.code, one.severity),
+        (GYRO_BIAS_CHANGE, Severity::Warning)
+    );
+    assert!(one.advice.contains("g under two"), "{one:?}");
+    assert_eq!(one.help.len(), 2, "{one:?}");
+    assert_eq!(found(before, &[]), []);
+    assert_eq!(found(&behind, &[]), []);
 }
