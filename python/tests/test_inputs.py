@@ -92,6 +92,10 @@ def test_what_can_not_be_is_refused_by_name(said: str, arguments: dict[str, obje
 def test_a_setting_that_is_none_is_a_type_error() -> None:
     with pytest.raises(TypeError, match="there is no setting \"colour\""):
         strapd.estimate(GYR, t=T, colour=1)
+    # Names that other libraries have, in place of stamps.
+    for name in ("fs", "freq", "sample_rate"):
+        with pytest.raises(TypeError, match=f'there is no setting "{name}"\n  help: rate_hz=100.0'):
+            strapd.estimate(GYR, **{name: 100.0})
 
 
 def test_what_these_samples_do_not_allow_is_an_error_of_its_kind() -> None:

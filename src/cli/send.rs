@@ -215,7 +215,7 @@ fn read(
 }
 
 /// Failure with what helps, where that is known.
-fn with_help(what: String, has_token: bool) -> Diagnostic {
+pub(super) fn with_help(what: String, has_token: bool) -> Diagnostic {
     let says = |words: &[&str]| words.iter().any(|word| what.contains(word));
     let help = if says(&["Connection refused", "connection refused", "No such file"]) {
         "is `strapd serve` running there? ADDRESS names where it listens"

@@ -86,7 +86,7 @@ fn the_folder_of_a_recording_is_the_recording_and_its_metadata_name_the_way_in()
     strapd(dir.path(), "info bag").refused(
         1,
         &[
-            "parts of one recording have the same",
+            "parts of one recording are of one device",
             "b.db3",
             "without --join",
         ],

@@ -45,6 +45,7 @@ mod follow;
 mod frozen;
 mod gate;
 mod histogram;
+mod lone_zeros;
 mod memory;
 mod mixture;
 mod order;
@@ -70,6 +71,7 @@ pub use clock::{
     choose_clock_as, sharing,
 };
 pub use histogram::Histogram;
+pub use lone_zeros::LoneZeros;
 pub use memory::Memory;
 pub use mixture::{Apart, Mixture};
 pub use rails::{Clipped, Rails};

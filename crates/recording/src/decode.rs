@@ -135,6 +135,8 @@ pub struct Options {
     pub nth_stamp: usize,
     /// Stamps are not read, since the samples' time is another: whether their unit is right is nobody's concern.
     pub are_stamps_unread: bool,
+    /// Somebody states the unit of the rates: that the table does not is nobody's concern.
+    pub is_unit_stated: bool,
 }
 
 impl Options {

@@ -45,6 +45,9 @@ type FormatMark = (usize, &'static [u8], &'static str, &'static str);
 const LINES: &str =
     "write a line {\"stamp_s\": T, \"gyro\": [X, Y, Z]} for each sample into a file .ndjson";
 
+/// Way in where there is none.
+const NO_SAMPLES: &str = "it holds no samples of a gyro: name the recording";
+
 const KNOWN: &[FormatMark] = &[
     (
         0,
@@ -162,6 +165,11 @@ const KNOWN: &[FormatMark] = &[
         "text in UTF-16",
         "iconv -f UTF-16 -t UTF-8 FILE > log.csv",
     ),
+    (0, b"\x89PNG\r\n", "a picture (PNG)", NO_SAMPLES),
+    (0, &[0xff, 0xd8, 0xff], "a picture (JPEG)", NO_SAMPLES),
+    (0, b"GIF8", "a picture (GIF)", NO_SAMPLES),
+    (0, b"%PDF-", "a document (PDF)", NO_SAMPLES),
+    (0, b"\x7fELF", "a program", NO_SAMPLES),
     (
         0,
         b"version https://git-lfs",
@@ -202,7 +210,32 @@ pub fn marked(first: &[u8], last: &[u8]) -> Option<Foreign> {
             "download the log itself",
         );
     }
+    for (word, name) in MARKED_UP {
+        if text
+            .get(..text.len().min(600))
+            .is_some_and(|head| contains(head, word))
+            && text.starts_with(b"<")
+        {
+            return of(name, NO_SAMPLES);
+        }
+    }
+    if starts_like(text, b"<?xml") {
+        return of("a text in XML", NO_SAMPLES);
+    }
     None
+}
+
+/// Texts in XML, by an element near their beginning.
+const MARKED_UP: [(&[u8], &str); 4] = [
+    (b"<gpx", "a track of positions (GPX)"),
+    (b"<kml", "places of a map (KML)"),
+    (b"<svg", "a picture (SVG)"),
+    (b"<trainingcenterdatabase", "a training (TCX)"),
+];
+
+fn contains(text: &[u8], word: &[u8]) -> bool {
+    text.windows(word.len())
+        .any(|part| part.eq_ignore_ascii_case(word))
 }
 
 fn of(name: &'static str, way_in: &str) -> Option<Foreign> {
@@ -272,6 +305,10 @@ mod tests {
             Some("a video (MP4, MOV) without the telemetry of a GoPro, or cut before its index")
         );
         assert!(name(b"\n <!DOCTYPE HTML><p>").unwrap().contains("web page"));
+        let track = b"<?xml version=\"1.0\"?>\n<gpx version=\"1.1\"><trk>";
+        assert_eq!(name(track), Some("a track of positions (GPX)"));
+        assert_eq!(name(b"<svg width=\"3\">"), Some("a picture (SVG)"));
+        assert_eq!(name(b"<?xml version=\"1.0\"?><a/>"), Some("a text in XML"));
         for table in [
             &b"time,gyro_x,gyro_y\n1,2,3"[..],
             b"\xef\xbb\xbf\"Time (s)\";\"Gyroscope x (rad/s)\";\"y\"\r\n",

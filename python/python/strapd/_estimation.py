@@ -65,6 +65,16 @@ def _summary(outcome: tuple[str, list[str], dict[str, Any]]) -> dict[str, Any]:
     return {**json.loads(answer), "warnings": warned, "calibration": calibration}
 
 
+#: Names that other libraries give ``rate_hz``.
+_RATES = ("fs", "freq", "frequency", "sample_rate", "sampling_rate", "sample_rate_hz", "rate", "hz")
+
+
+def _refuse_other_names(settings: dict[str, Any]) -> None:
+    for name in _RATES:
+        if name in settings:
+            raise TypeError(f'there is no setting "{name}"\n  help: rate_hz={settings[name]!r}')
+
+
 def _run(
     gyr: npt.ArrayLike,
     t: Optional[npt.ArrayLike],
@@ -76,6 +86,8 @@ def _run(
 ) -> Attitude:
     rates = _inputs.rates(gyr)
     n = rates.shape[0]
+    if t is None and rate_hz is None:
+        _refuse_other_names(settings)
     acc, mag, orientation = beside
     columns, outcome = _strapd.estimate(
         rates,

@@ -3,6 +3,7 @@
 use super::{Cat, Format};
 use crate::address::Address;
 use crate::cli::Outcome;
+use crate::cli::send::with_help;
 use crate::client;
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
@@ -53,7 +54,7 @@ pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
 async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Outcome> {
     let failed = |what: String| Error::Remote {
         address: remote.to_string().into(),
-        what: what.into(),
+        what: with_help(what, token.is_some()),
     };
     // A second one ends the process even when nobody reads our output.
     let mut signals = Signals::new().map_err(|e| Error::usage(format!("signals: {e}")))?;

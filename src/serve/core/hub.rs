@@ -269,7 +269,7 @@ impl Hub {
     /// Whether the daemon was told the unit of rates.
     #[must_use]
     pub(in crate::serve) fn states_gyro_unit(&self) -> bool {
-        self.sensors.plan_of("").unit.is_some()
+        self.sensors.plan_of("").states_gyro_unit()
     }
 
     /// Options by which lines are read.

@@ -126,6 +126,8 @@ impl Reading {
         let mut options = options.clone();
         options.columns = asked.columns.clone().or(options.columns);
         options.delimiter = asked.delimiter.or(options.delimiter);
+        // A sample without a stamp has one by then.
+        options.are_stamps_unread |= asked.by_arrival;
         if !asked.rows.is_empty() {
             options.rows.clone_from(&asked.rows);
         }

@@ -335,6 +335,7 @@ impl Session {
                     }
                     Err(denied) => {
                         count(&self.hub.counters.faults, 1);
+                        count(&self.hub.counters.refused, 1);
                         let words = wire::error(&denied.fault, number, &[], 0);
                         self.last_words = Some((denied.delay, words));
                         self.end = Some(End::Unauthorised);
@@ -345,8 +346,10 @@ impl Session {
         }
     }
 
+    /// Refuses somebody who has shown no token.
     fn refuse(&mut self, fault: &Fault, number: u64) {
         count(&self.hub.counters.faults, 1);
+        count(&self.hub.counters.refused, 1);
         // Nothing of the line is repeated: it may hold a token with a slip.
         self.client.complain(fault, (number, &[]), 0);
         self.lose(fault, number, &[]);

@@ -15,6 +15,7 @@ pub use summary::{AxisStats, GravityAxis, OffsetStats, SpacingStats};
 
 use super::clock::{Clock, Turns};
 use super::histogram::Histogram;
+use super::lone_zeros::LoneZeros;
 use super::rails::Rails;
 use super::regularise::{Lines, Uneven};
 use super::report::Wraps;
@@ -78,7 +79,7 @@ pub struct QualitySummary {
     pub not_finite: u64,
     /// Samples with a gyro of exactly (0, 0, 0).
     pub zero_rows: u64,
-    /// Number of these, alone between two that are not.
+    /// Number of these amid a rotation.
     pub lone_zero_rows: u64,
     /// Samples with a rate that no gyro reaches in rad/s, below nonsense.
     pub fast_rows: u64,
@@ -138,7 +139,7 @@ pub struct Quality {
     longest_gap: i64,
     /// The newest hole: between which stamps, and how many samples are still missing in it.
     hole: Option<(Nanos, Nanos, u64)>,
-    last_row_lone_zero: bool,
+    zeros: LoneZeros,
     was_fast: bool,
     axes: [Axis; 3],
     rails: Rails,
@@ -187,7 +188,7 @@ impl Quality {
             sharing: 1,
             longest_gap: 0,
             hole: None,
-            last_row_lone_zero: false,
+            zeros: LoneZeros::default(),
             was_fast: false,
             axes: [Axis::EMPTY; 3],
             rails: Rails::new(),
@@ -348,12 +349,8 @@ impl Quality {
         self.so_far.zero_rows += u64::from(gyro == [0.0; 3]);
         let held = self.previous == Some(gyro);
         self.so_far.repeated_rows += u64::from(held);
-        // A zero between readings that are none, and no rest: that takes two in a row.
-        if self.last_row_lone_zero && gyro != [0.0; 3] {
-            self.so_far.lone_zero_rows += 1;
-        }
-        self.last_row_lone_zero =
-            gyro == [0.0; 3] && self.previous.is_some_and(|previous| previous != [0.0; 3]);
+        self.zeros.push(&gyro);
+        self.so_far.lone_zero_rows = self.zeros.count();
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         // A motion goes on, and is no word for nothing on every axis (-999, 655.35).

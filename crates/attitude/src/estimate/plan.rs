@@ -212,6 +212,12 @@ impl Default for EstimationSettings {
 }
 
 impl EstimationSettings {
+    /// Returns whether somebody states the unit of the recorded rates, or the factor that makes rad/s of them.
+    #[must_use]
+    pub fn states_gyro_unit(&self) -> bool {
+        self.unit.is_some() || self.gyro_scale != [1.0; 3]
+    }
+
     /// Whether a step of so many nanoseconds is integrated across.
     #[must_use]
     pub fn bridges(&self, nanos: i64) -> bool {

@@ -159,6 +159,7 @@ pub(crate) struct Opening {
     /// Name of the file, without its ending.
     stem: String,
     wanted: Wanted,
+    are_stamps_unread: bool,
     lines: Vec<Vec<u8>>,
     /// Number of times that a line followed itself, by its place.
     repeated: BTreeMap<usize, u64>,
@@ -194,6 +195,7 @@ impl Opening {
             filters: options.rows.clone(),
             stem: stem.to_owned(),
             wanted: options.wanted,
+            are_stamps_unread: options.are_stamps_unread,
             lines: Vec::new(),
             repeated: BTreeMap::new(),
             bytes: 0,
@@ -348,6 +350,7 @@ impl Opening {
             given: self.given.as_ref(),
             stem: &self.stem,
             wanted: self.wanted,
+            are_stamps_unread: self.are_stamps_unread,
         };
         let mut table = roles.table(header, found.delimiter)?;
         table.given = self.given;

@@ -53,7 +53,8 @@ impl TextLog {
     ) -> Result<(TextLog, Vec<LogChannel>)> {
         let mut lines = input.lines(options)?;
         let mut met = TextChannels::of(&lines, options);
-        let mut notes = (lines.notes(), doubt_of_unit(&lines));
+        let doubt = doubt_of_unit(&lines).filter(|_| !options.is_unit_stated);
+        let mut notes = (lines.notes(), doubt);
         let mut cache = CacheWriter::new(kept);
         let take = |event: LineEvent<'_, Bytes>| -> Result<_> {
             match &event {

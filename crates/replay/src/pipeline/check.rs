@@ -95,10 +95,11 @@ pub fn examine(
         let replayed = one.and_then(|topic| topic.replayed.ok());
         Ok::<_, Error>(replayed.map(|summary| summary.findings))
     })?;
-    let asked = Examination {
+    let mut asked = Examination {
         plan,
         ..asked.clone()
     };
+    asked.selection.decode.is_unit_stated = asked.plan.states_gyro_unit();
     examine_by(input, &asked, pool, watch)
 }
 

@@ -84,7 +84,7 @@ pub(super) fn replay_lines(
 ) -> Result<RunSummary> {
     let path = run.source.name();
     let made_before = MadeBefore::in_lines(&lines).filter(|_| run.selection.topic.is_none());
-    let doubt = doubt_of_unit(&lines).filter(|_| run.plan.unit.is_none());
+    let doubt = doubt_of_unit(&lines).filter(|_| !run.plan.states_gyro_unit());
     let notes = lines.notes().into_iter().chain(doubt);
     let notes = notes.map(Diagnostic::from);
     let notes = notes.chain(made_before.as_ref().map(integrated_again));

@@ -75,6 +75,7 @@ impl ReplayRequest {
     pub(super) fn decode_options(&self) -> Options {
         Options {
             are_stamps_unread: self.plan.clock != Clock::Header,
+            is_unit_stated: self.plan.states_gyro_unit(),
             ..self.selection.decode.clone()
         }
     }

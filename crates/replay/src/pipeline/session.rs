@@ -15,8 +15,8 @@ use crate::summary::warming::Warming;
 use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::condition::Histogram;
 use strapd_attitude::condition::quality::BrokenAxes;
+use strapd_attitude::condition::{Histogram, LoneZeros};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Aid, EstimationSettings};
@@ -109,40 +109,6 @@ impl WarmingWatch {
         };
         self.pairs
             .push(f64::from(temperature), removed.0 + bias, sigma);
-    }
-}
-
-/// Samples that are exactly zero about all axes between two that are not: what a driver without data says. Several in a
-/// row are a rest, but where the body turns before them and behind.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct LoneZeros {
-    /// Number.
-    pub count: u64,
-    /// Zeros in a row by now, and the largest rate of the sample before them or of the last, rad/s.
-    run: u64,
-    before: Option<f64>,
-}
-
-/// Rate, rad/s, of a body that no single sample brings to rest.
-const TURNS: f64 = 0.3;
-
-impl LoneZeros {
-    /// Takes rates, rad/s.
-    pub(super) fn take(&mut self, rates: Option<[f64; 3]>) {
-        let Some(rates) = rates else { return };
-        let largest = rates
-            .iter()
-            .fold(0.0, |most: f64, rate| most.max(rate.abs()));
-        if rates == [0.0; 3] {
-            self.run += 1;
-            return;
-        }
-        let run = std::mem::take(&mut self.run);
-        if let Some(before) = self.before.replace(largest)
-            && (run == 1 || before.min(largest) > TURNS)
-        {
-            self.count += run;
-        }
     }
 }
 
@@ -275,11 +241,12 @@ impl Topic {
         if raw.is_beside {
             return is_due;
         }
-        let rates = raw.gyro.map(|gyro| self.resolved.rates(gyro));
-        self.zeros.take(rates);
         let is_rate = matches!(self.resolved.kind, SampleKind::Rate | SampleKind::Average);
-        if let Some(rates) = rates.filter(|_| is_rate) {
-            self.broken.push(&rates);
+        if let Some(rates) = raw.gyro.map(|gyro| self.resolved.rates(gyro)) {
+            self.zeros.push(&rates);
+            if is_rate {
+                self.broken.push(&rates);
+            }
         }
         is_due
     }
@@ -601,25 +568,4 @@ pub(super) struct FinishedRun {
     pub topics: Vec<Topic>,
     /// Outputs by name.
     pub outputs: Vec<(String, Written)>,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn zeros_amid_a_rotation_are_counted_and_a_rest_is_not() {
-        let count = |rates: &[f64]| {
-            let mut zeros = LoneZeros::default();
-            rates
-                .iter()
-                .for_each(|rate| zeros.take(Some([*rate, 0.0, 0.0])));
-            zeros.count
-        };
-        assert_eq!(count(&[1.0, 0.0, 0.0, 0.0, 1.2, 0.0, 1.1]), 4);
-        // One that slows down, one that begins, one that ends, and a single one however slow it is.
-        assert_eq!(count(&[0.4, 0.1, 0.0, 0.0, 0.0, 0.6]), 0);
-        assert_eq!(count(&[0.0, 0.0, 1.0, 1.0, 0.0, 0.0]), 0);
-        assert_eq!(count(&[0.01, 0.0, 0.01]), 1);
-    }
 }

@@ -90,7 +90,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             conditioning: topic.estimator.conditioning(),
             largest_rate: topic.output.largest_rate,
             marked_absent: topic.noticed.gyro_marked_absent.load(Ordering::Relaxed),
-            zeros: topic.zeros.count,
+            zeros: topic.zeros.count(),
             stamps_carried: topic.noticed.stamps_carried.load(Ordering::Relaxed),
             left_out: &topic.noticed.left_out(),
             frozen_field: topic.field.as_ref().and_then(FieldWatch::frozen),

@@ -50,7 +50,14 @@ impl Session {
             }
             _ if !self.authorised => {
                 scratch.run.samples.truncate(before);
-                self.refuse(&first_line_must_be_auth(), number);
+                let mut fault = first_line_must_be_auth();
+                // A request, as of the page before it asks for the token, brings no sample that is lost.
+                let is_sample =
+                    matches!(read, Ok(Message::Samples(_) | Message::Packed(..)) | Err(_));
+                if !is_sample {
+                    fault.kind = Kind::Request;
+                }
+                self.refuse(&fault, number);
             }
             Ok(Message::Samples(head)) => {
                 self.settle_on_objects();

@@ -228,9 +228,12 @@ impl Roles<'_> {
                 clock: Clock::Nothing,
                 column: None,
                 date: None,
-                notes: vec![format!(
-                    "no column says when it was measured, and its head no rate: {TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT"
-                )],
+                notes: match self.are_stamps_unread {
+                    true => Vec::new(),
+                    false => vec![format!(
+                        "no column says when it was measured, and its head no rate: {TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT"
+                    )],
+                },
             });
         };
         let period = nearly_whole(1e9 / rate.hz);

@@ -26,6 +26,8 @@ pub(super) struct Roles<'l> {
     pub(super) given: Option<&'l Columns>,
     pub(super) stem: &'l str,
     pub(super) wanted: Wanted,
+    /// Whether the samples' time is another than that of the rows.
+    pub(super) are_stamps_unread: bool,
 }
 
 /// Columns that may be a vector.
