@@ -216,7 +216,7 @@ def main():
             table.setdefault(f"{who} 6D", {})[name] = score(six, ref, moves, False)
             if nine is not None:
                 table.setdefault(f"{who} 9D", {})[name] = score(nine, ref, moves, True)
-    print("| deg, total / heading / inclination; within 3 sigma | mean |", " | ".join(os.path.basename(p)[:2] for p in paths), "|")
+    print("| deg, total / heading / tilt; within 3 sigma | mean |", " | ".join(os.path.basename(p)[:2] for p in paths), "|")
     print("|---|---|" + "---|" * len(paths))
     words = lambda s: " / ".join(f"{v:.2f}" for v in s[:3]) + ("" if np.isnan(s[3]) else f"; {s[3]:.1f} %")
     for who, trials in table.items():

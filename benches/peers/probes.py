@@ -322,7 +322,7 @@ def motions(binary):
         return 20 * np.sin(2 * np.pi * np.outer(t, [31.0, 37.0, 41.0]))
 
     both = ("6D", "9D")
-    print("| motion | strapd: largest inclination | largest heading | heading at the end | VQF: largest inclination | largest heading | heading at the end |")
+    print("| motion | strapd: largest tilt | largest heading | heading at the end | VQF: largest tilt | largest heading | heading at the end |")
     print("|---|---|---|---|---|---|---|")
     bend = {"the turn": (60 / 140, 80 / 140), "60 s after it": (80 / 140, 1.0)}
     probe("car turns at 0.3 g for 20 s, quiet", binary, made(rng, 100, 140, turning, outward), bend, both)

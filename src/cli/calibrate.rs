@@ -21,7 +21,7 @@ use strapd_recording::Selection;
 use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 
-/// Calibrate a sensor: what recordings of it tell of its bias, scale and axes, of all of them together.
+/// Calibrate a sensor: what recordings of it tell of its bias, scale and misalignment, of all of them together.
 ///
 /// Each recording is smoothed by itself, and what they tell is pooled: what one of them does not show another may, and
 /// where they differ, sigma says so. For magnetometers: --aid gravity+mag.

@@ -233,7 +233,7 @@ fn chart(estimate: &[Stamped], reference: Reference<'_>, align: Align, errors: &
     let named = [
         ("total", &errors.total),
         ("heading", &errors.heading),
-        ("inclination", &errors.inclination),
+        ("tilt", &errors.inclination),
     ];
     let [rms, p95, max] = degrees(&errors.total);
     Chart {
@@ -325,7 +325,7 @@ fn as_text(result: &Comparison, align: Align, estimate: &str, reference: &str) -
         for (name, stats) in [
             ("total", &errors.total),
             ("heading", &errors.heading),
-            ("inclination", &errors.inclination),
+            ("tilt", &errors.inclination),
         ] {
             let [rms, p95, max] = degrees(stats);
             let _ = writeln!(out, "  {name:<12} {rms:>10}  {p95:>10}  {max:>10}");

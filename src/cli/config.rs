@@ -82,7 +82,7 @@ pub fn run(args: &Config) -> Result<Outcome> {
             let layered = layered(file, argv(file))?;
             layered.serve.recording()?;
             layered.settings()?.check()?;
-            print(&format!("{}: in order\n", file.display()))?;
+            print(&format!("{}: OK\n", file.display()))?;
         }
         Action::Show { file } => print(&layered(file, argv(file))?.show())?,
     }

@@ -27,7 +27,7 @@ use strapd_replay::info::Overview;
 pub struct Info {
     #[arg(value_name = "FILE", required = true, help = super::recordings("Recordings", ", or folders of one"))]
     pub files: Vec<PathBuf>,
-    /// Look at this topic too, though it is not obviously an IMU's
+    /// Look at this topic too, even if it does not look like an IMU
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
     /// Path of a value in the message: ROLE=PATH, as in replay

@@ -1,6 +1,6 @@
 //! A log, examined -> one self-contained HTML page, and the same as JSON. Pure.
 //!
-//! No script, no font, no picture from anywhere else: the page is to be mailed, printed and opened
+//! No script, no font, no picture from anywhere else: the page is to be shared, printed and opened
 //! ten years on. Its own script is named by its hash, and may ask nobody. What cannot be said is said to be so, with
 //! the reason.
 

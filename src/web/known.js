@@ -17,9 +17,9 @@ const MILLI = 1000;
 const ROWS = [
   ["gyro bias", "°/s", "gyro_bias_rad_s", DEGREES, 3],
   ["gyro scale", "%", "gyro_scale_ppm", 1e-4, 2],
-  ["gyro axes xy xz yz", "°", "gyro_cross_rad", DEGREES, 2],
+  ["gyro misalignment xy xz yz", "°", "gyro_cross_rad", DEGREES, 2],
   ["accel bias", "m/s²", "accel_bias_m_s2", 1, 3],
-  ["accel lead", "ms", "accel_lead_s", MILLI, 2],
+  ["accel time offset", "ms", "accel_lead_s", MILLI, 2],
 ];
 
 const list = (value) => (Array.isArray(value) ? value : [value]);

@@ -136,7 +136,7 @@ async function ask() {
       }),
     );
     draw();
-    state("open", "worked out");
+    state("open", "computed");
     window.__strapd.asked++;
   } catch (error) {
     if (!signal.aborted) problem(error.message);
@@ -152,7 +152,7 @@ function state(name, words) {
 function problem(text) {
   parts.problem.hidden = text === "";
   say(parts.problem, text);
-  if (text) state("closed", "not worked out");
+  if (text) state("closed", "not computed");
 }
 
 function short(value) {

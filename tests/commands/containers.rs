@@ -61,7 +61,7 @@ fn a_flight_of_px4_is_looked_at_replayed_and_held_against_its_own_attitude() {
         "ULog; written by PX4 on PX4_FMU_V5",
         "ulog/sensor_combined [ros1]",
         "vehicle_attitude",
-        "dropped what came within 97 ms",
+        "what came within 97 ms is missing",
     ] {
         assert!(lossy(&info).out.contains(words), "{words}: {info:?}");
     }

@@ -66,7 +66,7 @@ fn strength(length: Option<f64>) -> String {
     match field_unit(length) {
         Some(unit) => format!("first of length {}, {unit} by that", significant(length, 3)),
         None => format!(
-            "first of length {}, the Earth's in no unit: calibrated it is not",
+            "first of length {}: uncalibrated; magnitude does not match the Earth's field",
             significant(length, 3)
         ),
     }

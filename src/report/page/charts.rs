@@ -198,9 +198,9 @@ fn reset_marks(lines: &[Series], time: Time, resets: &[i64]) -> Option<Series> {
     (!points.is_empty()).then(|| bound("reference reset", points, 0))
 }
 
-/// Heading and inclination of one meaning.
+/// Heading and tilt of one meaning.
 pub(super) fn parts(trace: &Traces<3>, time: Time) -> Result<String, String> {
-    let lines = [(1, "heading"), (2, "inclination")]
+    let lines = [(1, "heading"), (2, "tilt")]
         .map(|(index, name)| line(name, index, trace.points(index, time.nanos)));
     over_time(time, "Error as taken here, in parts", "deg", lines.into())
 }

@@ -53,7 +53,7 @@ pub(super) fn section(
             "over 1 s: median / 95 %, deg",
             "total: rms / 95 % / max, deg",
             "heading",
-            "inclination",
+            "tilt",
         ],
         &rows,
     );

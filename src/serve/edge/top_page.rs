@@ -267,7 +267,7 @@ pub(in crate::serve) async fn answer(
         Err(_) => refusal(
             StatusCode::INTERNAL_SERVER_ERROR,
             "failed",
-            "this top could not be worked out",
+            "this top could not be computed",
         ),
     }
 }

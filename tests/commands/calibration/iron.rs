@@ -101,7 +101,8 @@ fn soft_iron_that_no_motion_shows_stays_zero_and_is_missing() {
         log(at, "turns.ndjson", motion, share);
         let run = "calibrate turns.ndjson --aid gravity+mag -o c.toml --force";
         let said = strapd(at, run).done().out.clone();
-        let missing = "missing        the magnetometer's soft iron: none above 3 % shows; rotate";
+        let missing =
+            "not observable        the magnetometer's soft iron: none above 3 % shows; rotate";
         assert!(said.contains(missing), "{said}");
         let axes = "the magnetometer's hard iron along x and y and z: rotate";
         assert_eq!(said.contains(axes), motion.0 == "car", "{said}");

@@ -91,7 +91,7 @@ fn accelerations_on_a_topic_of_their_own_are_named_and_the_advice_takes_them() {
             let with = said(&format!(
                 "replay log.mcap -o null: --topic {RATES} {advice}"
             ));
-            assert!(with.contains("tilt corrected"), "{with}");
+            assert!(with.contains("gravity updates"), "{with}");
             assert!(!with.contains("no specific force"), "{with}");
         }
     }

@@ -441,7 +441,7 @@ fn the_summary_says_what_corrects_and_how_to_choose_otherwise() {
     let ran = replayed(Some, "");
     ran.done();
     for word in [
-        "gravity: tilt corrected",
+        " gravity updates, heading the gyro's",
         "--aid none",
         "learned: bias",
         "world level",

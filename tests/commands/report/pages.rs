@@ -240,13 +240,7 @@ fn compare_draws_its_errors() {
     let ran = strapd(dir, "compare est.csv top.mcap --plot error.svg");
     ran.done();
     let svg = std::fs::read_to_string(dir.join("error.svg")).unwrap();
-    for word in [
-        "total, rms",
-        "heading, rms",
-        "inclination, rms",
-        "95 %",
-        "max",
-    ] {
+    for word in ["total, rms", "heading, rms", "tilt, rms", "95 %", "max"] {
         assert!(svg.contains(word), "{word}");
     }
     // The numbers of the text stand in the title.
@@ -305,7 +299,7 @@ fn errors_lie_between_their_three_sigma_and_what_was_learned_is_in_a_table() {
     assert!(html.contains("The error is beyond 3 sigma"), "no verdict");
     assert!(html.contains("bias-by-orientation") && html.contains("beyond-sigma"));
     let (html, _) = page(dir.path(), &samples, "--aid gravity");
-    assert!(html.contains("Calibration learned") && html.contains("accelerometer lead, ms"));
+    assert!(html.contains("Calibration learned") && html.contains("accelerometer time offset, ms"));
     // Gravity alone was measured.
     let innovations = figure(&html, "innovations").unwrap();
     assert!(innovations.contains("<polyline") && innovations.contains("3 sigma"));

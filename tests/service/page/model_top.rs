@@ -38,7 +38,7 @@ fn a_case_and_a_method_are_chosen_and_the_error_is_that_of_the_command() {
             "(() => {{ const form = document.querySelector('[data-testid=form]'); form.elements.case.value = '{case}'; form.elements.method.value = '{method}'; form.elements.rate_hz.value = '{rate}'; form.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()"
         ));
         browser.until(
-            "it is worked out",
+            "it is computed",
             &format!("__strapd.state === 'open' && __strapd.run.case === '{case}' && __strapd.run.methods[0].name === '{method}' && __strapd.run.rate_hz === {rate}"),
         );
         let expected = by_command(case, method, rate);

@@ -368,10 +368,9 @@ impl fmt::Display for ProblemKind {
                 "a record of type {:?} with {length} bytes that cannot be used; skipped",
                 char::from(*kind)
             ),
-            ProblemKind::Dropout { millis } => write!(
-                f,
-                "the logger was too slow and dropped what came within {millis} ms"
-            ),
+            ProblemKind::Dropout { millis } => {
+                write!(f, "logger dropout: what came within {millis} ms is missing")
+            }
             ProblemKind::UnknownFeature { bits } => write!(
                 f,
                 "the log needs a feature this program does not know (flags {bits:#x})"

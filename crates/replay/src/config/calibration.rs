@@ -262,12 +262,12 @@ pub fn text_of(known: &SensorCalibration) -> String {
         &known.force_bias,
     );
     section(&mut out, "A", "force = (I + A) (accel - ba)", &known.force);
-    let lead = "s: a force belongs to the attitude so long after its stamp";
+    let lead = "time offset, s: a force belongs to the attitude so long after its stamp";
     section(&mut out, "lead", lead, &known.lead);
     let iron = "hard iron, in the unit the field is recorded in";
     section(&mut out, "h", iron, &known.hard_iron);
     section(&mut out, "S", "field = (I + S) (mag - h)", &known.soft_iron);
-    let lead = "s: a field belongs to the attitude so long after its stamp";
+    let lead = "time offset, s: a field belongs to the attitude so long after its stamp";
     section(&mut out, "mag_lead", lead, &known.field_lead);
     let step = "rad/s: in such steps the driver cuts the rates towards zero";
     section(&mut out, "truncation_step", step, &known.truncation_step);

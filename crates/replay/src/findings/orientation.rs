@@ -141,9 +141,9 @@ fn told_by_it(
     let advice = if help.is_some() {
         "without that bias it may hold"
     } else if summary.aided.is_some() {
-        "this motion is not as the filter takes it, or the orientation is no truth"
+        "the motion violates the filter's assumptions, or the reference is wrong"
     } else {
-        "the sensor is worse than its class, or the orientation is no truth"
+        "the sensor is worse than its class, or the reference is wrong"
     };
     // The next worse class; there is none behind the last, and a list is the user's own.
     let worse = match summary.noise.as_str() {
@@ -363,7 +363,7 @@ fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
                     significant(deg(fit.median_turn), 3)
                 ),
             )
-            .advise("it is no truth for these samples, or their clocks differ"),
+            .advise("it is no reference for these samples, or their clocks differ"),
         ));
         return false;
     }

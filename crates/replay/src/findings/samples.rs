@@ -304,7 +304,8 @@ fn bias(seen: &Seen<'_>, out: &mut Vec<Finding>) {
                 Severity::Warning,
                 BIAS_CODE,
                 format!(
-                    "at rest the gyro reads {} deg/h (+- {}): so fast the attitude drifts",
+                    "gyro bias {} deg/s ({} +- {} deg/h) at rest; the attitude drifts as fast",
+                    significant(size / 3600.0, 2),
                     significant(size, 3),
                     significant(to_deg_per_h(sigma), 2)
                 ),

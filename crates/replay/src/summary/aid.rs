@@ -74,11 +74,11 @@ impl FilterSummary {
         } = self.report;
         let mut did = if self.has_field {
             format!(
-                "gravity and field: corrected {updates} times, heading by {fields} fields of the magnetometer ({AID} gravity: without)"
+                "gravity and field: {updates} gravity updates, heading by {fields} fields of the magnetometer ({AID} gravity: without)"
             )
         } else {
             format!(
-                "gravity: tilt corrected {updates} times, heading the gyro's ({AID} none: the gyro alone)"
+                "gravity: {updates} gravity updates, heading the gyro's ({AID} none: the gyro alone)"
             )
         };
         if self.is_implausible {
@@ -87,6 +87,16 @@ impl FilterSummary {
         }
         if self.has_field && fields == 0 {
             did += "; NO FIELD belonged to a sample";
+        }
+        for (n, what) in [
+            (restarts, "acceleration rejected"),
+            (levelled, "re-initialised"),
+        ] {
+            match n {
+                0 => {}
+                1 => did += &format!(", {what} once"),
+                _ => did += &format!(", {what} {n} times"),
+            }
         }
         for (n, what) in [
             (
@@ -98,9 +108,7 @@ impl FilterSummary {
                 "forces half a second off every sample, or no numbers",
             ),
             (fields_rejected, "corrections by the field doubted"),
-            (levelled, "times levelled anew"),
-            (restarts, "times taken to travel"),
-            (forces_rejected, "forces rejected"),
+            (forces_rejected, "forces not finite or too large"),
             (saturated, "samples at the gyro's range"),
             (failures, "FULL RESTARTS"),
         ] {
@@ -112,7 +120,7 @@ impl FilterSummary {
         let mut lines = vec![
             did,
             format!(
-                "learned: bias {} +- {} deg/s, scale {} +- {} %, lead {} ms",
+                "learned: bias {} +- {} deg/s, scale {} +- {} %, accelerometer time offset {} ms",
                 deg(&self.calibration.bias),
                 deg(&self.sigma.bias),
                 triple(&(self.calibration.scale * 100.0)),
@@ -182,7 +190,7 @@ impl FilterSummary {
                 three("gyro bias, deg/s", found.bias.map(deg), sigma.bias.map(deg)),
                 three("gyro scale, %", found.scale * 100.0, sigma.scale * 100.0),
                 three(
-                    "between its axes, deg",
+                    "gyro misalignment, deg",
                     found.cross.map(deg),
                     sigma.cross.map(deg),
                 ),
@@ -191,7 +199,11 @@ impl FilterSummary {
                     found.force_bias,
                     sigma.force_bias,
                 ),
-                one("accelerometer lead, ms", found.lead * 1e3, sigma.lead * 1e3),
+                one(
+                    "accelerometer time offset, ms",
+                    found.lead * 1e3,
+                    sigma.lead * 1e3,
+                ),
             ]
         })
     }

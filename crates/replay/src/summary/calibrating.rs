@@ -73,18 +73,18 @@ impl Calibrating {
             } = recorded;
             let _ = writeln!(out, "{log}  {topic}  {samples} samples, {secs:.1} s");
             let mut line = |name: &str, text: &str| {
-                let _ = writeln!(out, "  {name:<9}{text}");
+                let _ = writeln!(out, "  {name:<11}{text}");
             };
             match recorded.told.as_slice() {
-                [] => line("told", "NOTHING"),
-                told => line("told", &told.join(", ")),
+                [] => line("estimated", "NOTHING"),
+                told => line("estimated", &told.join(", ")),
             }
             let doubts = recorded.not_smoothed.iter().chain(&recorded.doubts);
             doubts.for_each(|doubt| line("doubt", doubt));
         }
         let _ = writeln!(out, "the sensor");
         let mut line = |name: &str, text: &str| {
-            let _ = writeln!(out, "  {name:<15}{text}");
+            let _ = writeln!(out, "  {name:<22}{text}");
         };
         for row in rows(&self.pooled.calibration) {
             let [value, sigma] = [&row.value, &row.sigma].map(|numbers| {
@@ -92,7 +92,7 @@ impl Calibrating {
                 said.join(", ")
             });
             line(
-                row.name,
+                row.label(),
                 &match row.sigma.is_empty() {
                     true => format!("({value}) {}", row.unit),
                     false => format!("({value}) +- ({sigma}) {}{}", row.unit, row.part()),
@@ -116,7 +116,7 @@ impl Calibrating {
             );
         }
         for motion in self.missing() {
-            line("missing", &motion);
+            line("not observable", &motion);
         }
         if let Some(file) = &self.file {
             line(
@@ -163,7 +163,7 @@ impl Calibrating {
         }
         if axes.is_empty() && !gyro.is_empty() {
             missing.push(
-                "the gyro's axes: turn about each axis by half a turn and more, with rests between"
+                "the gyro's misalignment: turn about each axis by half a turn and more, with rests between"
                     .to_owned(),
             );
         }
@@ -175,7 +175,8 @@ impl Calibrating {
         }
         if !unknown(&known.lead).is_empty() {
             missing.push(
-                "the accelerometer's lead: turn fast, to and fro, at 200 deg/s and more".to_owned(),
+                "the accelerometer's time offset: turn fast, to and fro, at 200 deg/s and more"
+                    .to_owned(),
             );
         }
         if self.has_magnetometer {
@@ -240,6 +241,7 @@ impl Calibrating {
 
 /// Numbers of a calibration as people read them.
 struct Row {
+    /// Key in JSON, and of most rows the label.
     name: &'static str,
     unit: &'static str,
     value: Vec<f64>,
@@ -249,6 +251,18 @@ struct Row {
 }
 
 impl Row {
+    /// Words for people; `name` is the key in JSON.
+    fn label(&self) -> &'static str {
+        match self.name {
+            "gyro axes" => "gyro misalignment",
+            "accel axes" => "accel misalignment",
+            "accel lead" => "accel time offset",
+            "soft iron axes" => "soft iron cross-axis",
+            "mag lead" => "mag time offset",
+            name => name,
+        }
+    }
+
     /// Name of the part that data have not told.
     fn part(&self) -> &'static str {
         match self.observed.iter().filter(|o| **o).count() {

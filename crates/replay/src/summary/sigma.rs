@@ -151,10 +151,10 @@ fn alone(plan: &EstimationSettings, bias_sigma: [f64; 3], tilt_sigma: f64) -> Ve
         ),
         term(
             "axes",
-            "axes",
+            "misalignment",
             [noise.misalignment.to_degrees(); 3],
             "deg",
-            " of misalignment",
+            "",
         ),
         term(
             "initial_tilt",
@@ -200,21 +200,27 @@ fn filtered(settings: &Settings) -> Vec<Term> {
         ),
         one(
             "bias_walk",
-            "walk of the bias",
+            "bias random walk",
             settings.bias_walk.to_degrees(),
             "deg/s/sqrt(s)",
             "",
         ),
         one(
             "bias_by_tilt",
-            "its change with the side that is down",
+            "g-sensitivity",
             settings.bias_by_tilt.to_degrees(),
             "deg/s/g",
             "",
         ),
         one("bias", "bias", bias.to_degrees(), "deg/s", " at first"),
         one("scale", "scale", scale * 100.0, "%", " at first"),
-        one("axes", "axes", cross.to_degrees(), "deg", " at first"),
+        one(
+            "axes",
+            "misalignment",
+            cross.to_degrees(),
+            "deg",
+            " at first",
+        ),
         one(
             "accelerometer_bias",
             "accelerometer bias",
@@ -224,7 +230,7 @@ fn filtered(settings: &Settings) -> Vec<Term> {
         ),
         one(
             "accelerometer_lead",
-            "its lead",
+            "accelerometer time offset",
             settings.prior.lead_sigma.unwrap_or(settings.lead_prior) * 1e3,
             "ms",
             " at first",
@@ -252,7 +258,7 @@ fn filtered(settings: &Settings) -> Vec<Term> {
         ),
         one(
             "case",
-            "axes of its case",
+            "mounting misalignment",
             settings.case.to_degrees(),
             "deg",
             "",

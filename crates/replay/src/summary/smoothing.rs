@@ -190,7 +190,7 @@ impl Smoothing {
         let mut lines = vec![
             did,
             format!(
-                "learned: bias {} +- {} deg/s, wandering {}; scale {} +- {} %; not observed: {}",
+                "learned: bias {} +- {} deg/s, wandering {}; scale {} +- {} %; not observable: {}",
                 triple(bias),
                 triple(of_bias),
                 significant(self.wander, 2),
@@ -219,17 +219,17 @@ impl Smoothing {
         let c = &self.calibration;
         let m = c.magnetometer.as_ref();
         let all = [
-            part("gyro scale and axes", Some(&c.gyro)),
+            part("gyro scale and misalignment", Some(&c.gyro)),
             part(
                 "gyro sensitivity to acceleration",
                 Some(&c.gyro_sensitivity),
             ),
             part("accelerometer bias", Some(&c.force_bias)),
-            part("accelerometer scale and axes", Some(&c.force)),
-            part("accelerometer lead", Some(&c.force_time)),
+            part("accelerometer scale and misalignment", Some(&c.force)),
+            part("accelerometer time offset", Some(&c.force_time)),
             part("hard iron", m.map(|m| &m.hard_iron)),
             part("soft iron", m.map(|m| &m.matrix)),
-            part("magnetometer lead", m.map(|m| &m.time)),
+            part("magnetometer time offset", m.map(|m| &m.time)),
         ];
         let said: Vec<String> = all.into_iter().flatten().collect();
         if said.is_empty() {
@@ -279,11 +279,16 @@ impl Smoothing {
             1.0,
         ));
         matrix("accelerometer", &c.force, &mut rows);
-        rows.push(row("accelerometer lead, ms", &c.force_time, [0], 1e3));
+        rows.push(row(
+            "accelerometer time offset, ms",
+            &c.force_time,
+            [0],
+            1e3,
+        ));
         if let Some(m) = &c.magnetometer {
             rows.push(row("hard iron, uT", &m.hard_iron, [0, 1, 2], 1.0));
             matrix("magnetometer", &m.matrix, &mut rows);
-            rows.push(row("magnetometer lead, ms", &m.time, [0], 1e3));
+            rows.push(row("magnetometer time offset, ms", &m.time, [0], 1e3));
         }
         rows
     }
@@ -417,13 +422,13 @@ fn matrix(name: &str, learned: &Estimated<9>, rows: &mut Vec<Vec<String>>) {
     let degrees = 1f64.to_degrees();
     rows.push(row(&format!("{name} scale, %"), learned, [0, 4, 8], 100.0));
     rows.push(row(
-        &format!("{name} axes xy, xz, yz, deg"),
+        &format!("{name} misalignment xy, xz, yz, deg"),
         learned,
         [1, 2, 5],
         degrees,
     ));
     rows.push(row(
-        &format!("{name} axes yx, zx, zy, deg"),
+        &format!("{name} misalignment yx, zx, zy, deg"),
         learned,
         [3, 6, 7],
         degrees,

@@ -517,7 +517,7 @@ impl TopicSummary {
             || "integration error not estimated for this method".to_owned(),
             |error| {
                 format!(
-                    "integration error at most about {} deg, by a window of four samples less{}",
+                    "integration error at most about {} deg, estimated by comparison with a shorter window{}",
                     significant(error.to_degrees(), 2),
                     self.gaps.not_in_the_error()
                 )

@@ -162,7 +162,7 @@ pub static ROWS: [Row; 38] = [
     Row {
         setting: AID,
         meaning: "Measurements that correct the attitude: auto (gravity where the samples carry a specific force), none (the gyro alone), gravity, gravity+mag",
-        effect: "By gravity the attitude is level from the first sample, its tilt does not drift, and the gyro's bias, scale and axes are learned; the heading stays the gyro's. By gravity+mag the heading is that of the magnetic field.",
+        effect: "By gravity the attitude is level from the first sample, its tilt does not drift, and the gyro's bias, scale and misalignment are learned; the heading stays the gyro's. By gravity+mag the heading is that of the magnetic field.",
         default: Default::Value("auto"),
         environment: Some("STRAPD_AID"),
         placeholder: "AID",
