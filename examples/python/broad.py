@@ -6,7 +6,7 @@
 FOLDER holds trials as MCAP: /imu/data, /imu/mag, /ground_truth (sensor to earth, z up), /movement (a message at each change). The
 logs are read by PyPI's mcap, the numbers taken out of their CDR by numpy; strapd gets arrays. Metric (Laidig et al., "BROAD",
 Data 6(7):72, 2021): root mean square of the angle between attitude and truth while there is movement, split into heading and
-inclination; without a magnetometer the heading is set right at the first scored sample.
+tilt; without a magnetometer the heading is set right at the first scored sample.
 """
 
 import pathlib
@@ -54,7 +54,7 @@ def load(path):
 
 
 def scores(t, att, truth, moves, align):
-    """Total, heading, inclination, degrees."""
+    """Total, heading, tilt, degrees."""
     assert (att.t == t).all()
     scored = moves & np.isfinite(truth).all(axis=1)
     found = strapd.compare(att[scored], (t[scored], truth[scored]), align=align)
@@ -74,7 +74,7 @@ def main(folder, wanted):
         all_scores.append(pair)
         print(f"{path.stem:<48}" + "   ".join("{:6.2f} {:6.2f} {:6.2f}".format(*row) for row in pair))
     mean = np.mean(all_scores, axis=0)
-    print(f"{'mean: total, heading, inclination, deg; 6D, 9D':<48}" + "   ".join("{:6.2f} {:6.2f} {:6.2f}".format(*row) for row in mean))
+    print(f"{'mean: total, heading, tilt, deg; 6D, 9D':<48}" + "   ".join("{:6.2f} {:6.2f} {:6.2f}".format(*row) for row in mean))
 
 
 if __name__ == "__main__":
