@@ -108,7 +108,13 @@ impl Screen {
                     SetAttribute(Attribute::Bold),
                     SetForegroundColor(Color::Red)
                 )?,
-                Tone::Alarm => queue!(self.out, SetAttribute(Attribute::Reverse))?,
+                // No colour of an axis.
+                Tone::Silent if self.colour => {
+                    queue!(self.out, SetForegroundColor(Color::Yellow))?;
+                }
+                Tone::Alarm | Tone::Silent => {
+                    queue!(self.out, SetAttribute(Attribute::Reverse))?;
+                }
             }
             match tone {
                 Tone::Axes(places) if self.colour => self.figures(&text, *places)?,

@@ -12,12 +12,12 @@ use strapd_recording::text::printable;
 const PICTURE: (usize, usize) = (21, 7);
 /// Below this width there is no room for a picture.
 const WIDE: usize = 84;
-/// Silence after which a sensor is marked.
-const SILENT: Duration = Duration::from_secs(2);
-/// Silence after which it stands behind those that speak, in one line.
-const FOLDED: Duration = Duration::from_secs(5);
-/// Text for a sensor that has said nothing to us, but what was last before we came.
+/// Silence after which a sensor is marked, as on the page, and stands behind those that speak, in one line.
+const SILENT: Duration = Duration::from_secs(5);
+/// Text for a sensor that has said nothing to us.
 const NEVER_HEARD: &str = "silent since this watch began";
+/// Text for one of which the last attitude of before we came is all there is.
+const ENDED: &str = "ended, silent since this watch began";
 /// Longest name that is shown whole.
 const MAX_NAME: usize = 48;
 
@@ -27,6 +27,8 @@ pub(super) enum Tone {
     Plain,
     Heading,
     Alarm,
+    /// Tone of a sensor that is silent, or has ended.
+    Silent,
     /// Columns where the figures of x, y and z begin, and where that of z ends, in characters.
     Axes([usize; 4]),
 }
@@ -55,8 +57,7 @@ pub(super) fn heading(board: &Board, now: Instant) -> Line {
         ),
     };
     let plural = if sensors == 1 { "" } else { "s" };
-    let is_silent = |sensor: &&Sensor| silence(sensor, now).is_none_or(|time| time > FOLDED);
-    let silent = match board.sensors.values().filter(is_silent).count() {
+    let silent = match board.sensors.values().filter(|s| is_silent(s, now)).count() {
         0 => String::new(),
         n => format!(", {n} silent"),
     };
@@ -83,17 +84,14 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
         return vec![(Tone::Plain, "nothing has come yet".to_owned())];
     }
     let mut lines = Vec::new();
-    let is_silent = |sensor: &Sensor| silence(sensor, now).is_none_or(|time| time > FOLDED);
-    let all_are = board.sensors.values().all(is_silent);
+    let all_are = board.sensors.values().all(|s| is_silent(s, now));
     // Of one without an attitude there is nothing to unfold.
     let (folded, shown): (Vec<_>, Vec<_>) = board
         .sensors
         .iter()
-        .partition(|(_, sensor)| is_silent(sensor) && (!all_are || sensor.attitude.is_none()));
+        .partition(|(_, sensor)| is_silent(sensor, now) && (!all_are || sensor.attitude.is_none()));
     for (id, sensor) in shown {
-        let alarm = alarm(sensor, now);
-        let tone = if alarm { Tone::Alarm } else { Tone::Heading };
-        lines.push((tone, title(id, sensor)));
+        lines.push((tone(sensor, now), title(id, sensor, now)));
         let figures = figures(sensor, now);
         if width < WIDE {
             lines.extend(figures.into_iter().map(|line| behind("  ", line)));
@@ -113,13 +111,12 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
         lines.push((Tone::Plain, String::new()));
     }
     for (id, sensor) in folded {
-        let said = match (silence(sensor, now), &sensor.attitude) {
-            (Some(time), _) => format!("{}  silent for {}", shortened(id), lasting(time)),
-            (None, Some(_)) => title(id, sensor),
-            (None, None) => format!("{}  {NEVER_HEARD}", shortened(id)),
+        let said = match silence(sensor, now) {
+            Some(time) => format!("{}  silent for {}", shortened(id), lasting(time)),
+            None => title(id, sensor, now),
         };
         let angles = sensor.attitude.as_ref().map(|a| format!("  {}", angles(a)));
-        lines.push((Tone::Alarm, said + &angles.unwrap_or_default()));
+        lines.push((Tone::Silent, said + &angles.unwrap_or_default()));
     }
     lines
 }
@@ -128,6 +125,11 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
 fn silence(sensor: &Sensor, now: Instant) -> Option<Duration> {
     let heard = sensor.heard?;
     Some(now.saturating_duration_since(heard))
+}
+
+/// Whether it says nothing just now.
+fn is_silent(sensor: &Sensor, now: Instant) -> bool {
+    silence(sensor, now).is_none_or(|time| time > SILENT)
 }
 
 /// The same behind other characters.
@@ -158,32 +160,38 @@ fn angles(attitude: &Attitude) -> String {
     format!("roll {roll}  pitch {pitch}  yaw {yaw}  deg")
 }
 
-/// Whether something is wrong with a sensor now.
-fn alarm(sensor: &Sensor, now: Instant) -> bool {
-    let silent = sensor
-        .heard
-        .is_none_or(|heard| now.saturating_duration_since(heard) > SILENT);
-    let usual = |s: &String| matches!(s.as_str(), "ok" | "provisional" | "aided" | "rest");
-    silent
-        || sensor
-            .attitude
-            .as_ref()
-            .is_some_and(|a| !a.status.iter().all(usual))
+/// Tone of a sensor's title: whether it is silent, or something else is wrong with it now.
+fn tone(sensor: &Sensor, now: Instant) -> Tone {
+    if is_silent(sensor, now) {
+        return Tone::Silent;
+    }
+    match &sensor.attitude {
+        Some(a) if unusual(a).next().is_some() => Tone::Alarm,
+        _ => Tone::Heading,
+    }
 }
 
-fn title(id: &str, sensor: &Sensor) -> String {
-    let name = shortened(id);
-    match &sensor.attitude {
-        Some(a) => {
-            let silent = match sensor.heard {
-                Some(_) => String::new(),
-                None => format!("  {NEVER_HEARD}"),
-            };
-            let status = a.status.join(" ");
-            format!("{name}  {} in {}  {status}{silent}", a.body, a.world)
-        }
-        None => format!("{name}  {NEVER_HEARD}"),
+/// Words of a status that are worth a look.
+fn unusual(attitude: &Attitude) -> impl Iterator<Item = &str> {
+    let words = attitude.status.iter().map(String::as_str);
+    words.filter(|word| !matches!(*word, "ok" | "provisional" | "aided" | "rest"))
+}
+
+fn title(id: &str, sensor: &Sensor, now: Instant) -> String {
+    let Some(a) = &sensor.attitude else {
+        return format!("{}  {NEVER_HEARD}", shortened(id));
+    };
+    let mut title = format!("{}  {} in {}", shortened(id), a.body, a.world);
+    // That it was the last is said by what is said of its silence.
+    for word in unusual(a).filter(|word| *word != "last") {
+        title += &format!("  {word}");
     }
+    match silence(sensor, now) {
+        None => title += &format!("  {ENDED}"),
+        Some(time) if time > SILENT => title += &format!("  silent for {}", lasting(time)),
+        Some(_) => {}
+    }
+    title
 }
 
 fn shortened(id: &str) -> String {
@@ -247,8 +255,12 @@ fn figures(sensor: &Sensor, now: Instant) -> Vec<Line> {
         Tone::Plain,
         format!("{rate}{jitter}samples {}  gaps {}", h.samples, h.gaps),
     ));
+    let tone = match is_silent(sensor, now) {
+        true => Tone::Silent,
+        false => Tone::Plain,
+    };
     lines.push((
-        Tone::Plain,
+        tone,
         format!(
             "lost {}  missing {}  dropped {}  {}",
             h.lost,
@@ -268,10 +280,12 @@ fn rate(sensor: &Sensor) -> String {
 
 /// Time since it was heard last, in words.
 fn age(sensor: &Sensor, now: Instant) -> String {
-    sensor.heard.map_or_else(
-        || NEVER_HEARD.to_owned(),
-        |heard| format!("last {} ago", lasting(now.saturating_duration_since(heard))),
-    )
+    match silence(sensor, now) {
+        Some(time) if time > SILENT => format!("silent for {}", lasting(time)),
+        Some(time) => format!("last {} ago", lasting(time)),
+        None if sensor.attitude.is_some() => ENDED.to_owned(),
+        None => NEVER_HEARD.to_owned(),
+    }
 }
 
 /// Lines of what corrects it, how well tilt and heading are known, and what was learned of the gyro.
@@ -321,9 +335,13 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
             continue;
         };
         let known: String = knowledge(sensor).iter().map(|l| format!("{l}  ")).collect();
+        let words: String = unusual(a)
+            .filter(|word| *word != "last")
+            .map(|word| format!("  {word}"))
+            .collect();
         let h = &sensor.health;
         out.push_str(&format!(
-            "{}  seq {}  {}  {known}{}gaps {}  lost {}  dropped {}  {}  {}\n",
+            "{}  seq {}  {}  {known}{}gaps {}  lost {}  dropped {}  {}{words}\n",
             shortened(id),
             a.seq,
             angles(a),
@@ -331,15 +349,18 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
             h.gaps,
             h.lost,
             sensor.dropped,
-            age(sensor, now),
-            a.status.join(",")
+            age(sensor, now)
         ));
     }
     out
 }
 
-/// A number in so many characters, with its sign; one that does not fit says how large it is.
+/// A number in so many characters, with its sign; one that does not fit says how large it is, and what nobody knows is
+/// a dash.
 fn figure(value: f64, width: usize, digits: usize) -> String {
+    if value.is_nan() {
+        return format!("{:>width$}", "-");
+    }
     let text = format!("{value:+width$.digits$}");
     match text.len() > width {
         true => format!("{value:+width$.1e}"),

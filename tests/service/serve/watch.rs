@@ -164,7 +164,7 @@ fn a_sensor_is_seen_and_a_daemon_that_comes_back_too() {
     };
     for part in [
         "1 sensor  connected",
-        "imu\\u{1b}[31m0  flu in start  provisional",
+        "imu\\u{1b}[31m0  flu in start\n",
         "rate x  +90.000",
         "gaps 0",
         "///:::|  roll",

@@ -34,7 +34,8 @@ fn every_figure_of_a_sensor_is_shown_and_no_name_commands_the_terminal() {
         let lines = body(&board, now + Duration::from_millis(300), width);
         let text: String = lines.iter().map(|(_, l)| format!("{l}\n")).collect();
         for part in [
-            "imu\\u{1b}[31m0  flu in start  provisional",
+            "imu\\u{1b}[31m0  flu in start\n",
+            "sigma     0.010       0.010           -  deg (1 sigma, x y z)",
             "roll   +90.000  pitch    +0.000  yaw    +0.000  deg",
             "w +0.707107  x +0.707107  y +0.000000  z +0.000000",
             "rate x   +1.000  y   +0.000  z",
@@ -53,7 +54,7 @@ fn a_sensor_that_has_been_silent_since_the_start_is_shown_all_the_same() {
     let (board, now) = board_of(&[]);
     let lines = body(&board, now, 100);
     let silent = (
-        Tone::Alarm,
+        Tone::Silent,
         "other  silent since this watch began".to_owned(),
     );
     assert_eq!(lines.last(), Some(&silent), "behind those that speak");
@@ -72,22 +73,22 @@ fn the_last_attitude_of_before_is_shown_as_such_until_another_comes() {
     let last = ATT.replace("\"provisional\"", "\"provisional\",\"last\"");
     board.take(Said::Attitude(last.as_bytes()), now);
     let (tone, text) = body(&board, now, 100)[0].clone();
-    assert_eq!(tone, Tone::Alarm);
+    assert_eq!(tone, Tone::Silent);
     assert!(
-        text.ends_with("flu in start  provisional last  silent since this watch began"),
+        text.ends_with("flu in start  ended, silent since this watch began"),
         "{text}"
     );
     board.connected(now);
     let text = plain(&board, now);
     assert!(
         text.contains("roll   +90.000")
-            && text.ends_with("silent since this watch began  provisional,last\n"),
+            && text.ends_with("  ended, silent since this watch began\n"),
         "{text}"
     );
     board.take(Said::Attitude(ATT.as_bytes()), now);
     let (tone, text) = body(&board, now, 100)[0].clone();
     assert!(
-        tone == Tone::Heading && text.ends_with("  provisional"),
+        tone == Tone::Heading && text.ends_with("  flu in start"),
         "{text}"
     );
 }
@@ -105,11 +106,11 @@ fn the_silent_stand_behind_those_that_speak_in_a_line_each() {
     for width in [60, 100] {
         let lines = body(&board, later, width);
         assert!(heading(&board, later).1.contains("  4 sensors, 3 silent  "));
-        assert_eq!(lines[0].1, "z  flu in start  provisional");
+        assert_eq!(lines[0].1, "z  flu in start");
         let folded: Vec<&str> = lines[lines.len() - 3..]
             .iter()
             .map(|(tone, text)| {
-                assert_eq!(*tone, Tone::Alarm);
+                assert_eq!(*tone, Tone::Silent);
                 text.as_str()
             })
             .collect();
@@ -122,6 +123,18 @@ fn the_silent_stand_behind_those_that_speak_in_a_line_each() {
     // Where nobody speaks, what was last is worth the room.
     let lines = body(&board, later + Duration::from_secs(30), 100);
     assert!(lines.len() > 20 && lines[0].1.starts_with("a  flu"));
+    assert_eq!(
+        lines[0],
+        (Tone::Silent, "a  flu in start  silent for 42 s".to_owned())
+    );
+    let (tone, text) = lines
+        .iter()
+        .find(|(_, text)| text.contains("lost "))
+        .unwrap();
+    assert!(
+        *tone == Tone::Silent && text.ends_with("silent for 42 s"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -159,11 +172,14 @@ fn an_aided_attitude_is_no_alarm_and_says_what_is_known() {
             "aided by gra\\u{1b}[31mvity, at rest  sigma of tilt   0.312  heading   1.250  deg",
             "bias x +0.500  y -0.573  z",
             "deg/s (1 sigma at most 0.011)",
-            "provisional",
         ] {
             assert!(text.contains(part), "no `{part}` in\n{text}");
         }
         assert!(!text.contains('\u{1b}'));
+        assert!(
+            !text.contains("provisional") && !text.contains("NaN"),
+            "{text}"
+        );
     }
     let levelled = aided.replace("\"rest\"", "\"levelled\"");
     board.take(Said::Attitude(levelled.as_bytes()), now);
@@ -175,10 +191,10 @@ fn an_aided_attitude_is_no_alarm_and_says_what_is_known() {
 }
 
 #[test]
-fn silence_and_loss_are_alarms() {
+fn silence_has_a_tone_of_its_own_and_loss_is_an_alarm() {
     let (mut board, now) = board();
     assert_eq!(body(&board, now, 100)[0].0, Tone::Heading);
-    assert_eq!(body(&board, now + SILENT * 2, 100)[0].0, Tone::Alarm);
+    assert_eq!(body(&board, now + SILENT * 2, 100)[0].0, Tone::Silent);
     assert_eq!(heading(&board, now).0, Tone::Heading);
     board.lost("refused".to_owned(), now);
     board.lost("refused again".to_owned(), now + Duration::from_secs(3));
