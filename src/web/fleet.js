@@ -30,6 +30,8 @@ const COLUMNS = {
 };
 
 const NOTHING = [NaN, NaN, NaN];
+// JSON has no NaN: what nobody knows is null, and not 0.
+const size = (vector) => Math.hypot(...(vector ?? NOTHING).map((value) => value ?? NaN));
 
 class Row {
   constructor(id, template, choose) {
@@ -58,8 +60,8 @@ class Row {
     [this.q, this.angular] = [q, rate];
     [this.stamp, this.world, this.reset] = [att.stamp, att.world, att.reset];
     this.angles = rollPitchYaw(q);
-    this.speed = rate ? Math.hypot(...rate) * DEGREES : NaN;
-    this.sigma = sigma_deg ? Math.hypot(...sigma_deg) : NaN;
+    this.speed = size(rate) * DEGREES;
+    this.sigma = size(sigma_deg);
     if (!att.status?.includes("last")) this.heardAt = now;
   }
 

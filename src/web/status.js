@@ -1,11 +1,14 @@
 // STATUS -> the line about the daemon, and what each source tells.
 
 import { plain, say, whole } from "./numbers.js";
-import { taken } from "./sensor.js";
+import { isReference, taken } from "./sensor.js";
 
 let [last, lastAt] = [null, 0];
 
 const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
+
+// Samples of all sensors so far: what they are held against is none.
+export const samplesOf = (sources) => sources.reduce((total, each) => total + (isReference(each.id) ? 0 : taken(each)), 0);
 
 // Seconds after which samples that were not used are no news.
 const NEWS = 60;
@@ -32,8 +35,7 @@ export function told(parts, now, each) {
     return;
   }
   const { sources = [], clients = [] } = now;
-  const count = (list) => list.reduce((total, source) => total + taken(source), 0);
-  const rate = before ? Math.max(0, count(sources) - count(before.sources ?? [])) / elapsed : NaN;
+  const rate = before ? Math.max(0, samplesOf(sources) - samplesOf(before.sources ?? [])) / elapsed : NaN;
   say(parts.total, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
   say(parts.clients, whole(clients.length));
   const dropped = sum(clients, "dropped");
