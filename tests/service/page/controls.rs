@@ -34,6 +34,7 @@ fn keys_change_the_view_and_nothing_else() {
     let yaw = browser.shown("yaw");
     assert!((yaw - 0.499_f64.to_degrees()).abs() < 1e-6, "{yaw}");
     let q = browser.shown("q-z");
+    assert_eq!(browser.text("zero-yaw"), "Yaw zero, this view z");
     key(&mut browser, "z");
     browser.until(
         "yaw is zeroed",
