@@ -1,7 +1,9 @@
 // Instants -> seconds on the clock of the log, and how they are read.
 
-// Seconds between stamps from which on they are of different clocks: that of a phone counts from its start.
+// Seconds between stamps of a recording from which on they are of different clocks: that of a phone counts from its start.
 const APART = 86400;
+// Seconds between the first stamp of a live sensor and the newest of the others from which on its clock is another.
+const LATE = 60;
 
 // Differences before they become one float: nanoseconds survive.
 export const secondsBetween = (from, to) => to.sec - from.sec + (to.nsec - from.nsec) * 1e-9;
@@ -28,15 +30,18 @@ export function clockTime(value, digits = 1) {
 // One clock for all whose stamps are near each other; its zero is the start of the recording, or the first that came.
 export class Clocks {
   constructor() {
-    this.all = [];
+    this.begin(null);
   }
 
   begin(epoch) {
+    this.isRecording = Boolean(epoch);
     this.all = epoch ? [{ epoch, newest: NaN }] : [];
   }
 
   of(stamp) {
-    const known = this.all.find((clock) => Math.abs(secondsBetween(clock.epoch, stamp)) < APART);
+    // Live, those who speak are near the newest: who ended long ago, or counts from elsewhere, moves no axis of theirs.
+    const away = ({ epoch, newest }) => secondsBetween(epoch, stamp) - (this.isRecording ? 0 : newest || 0);
+    const known = this.all.find((clock) => Math.abs(away(clock)) < (this.isRecording ? APART : LATE));
     if (known) return known;
     const made = { epoch: stamp, newest: NaN };
     this.all.push(made);

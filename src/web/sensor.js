@@ -77,6 +77,8 @@ export class Sensor {
     }
     this.clock ??= this.clocks.of(stamp);
     const time = secondsBetween(this.clock.epoch, stamp);
+    // Pictures may wait, as those of a tab in the background do.
+    if (!(time <= this.clock.newest)) this.clock.newest = time;
     if (this.last && time < this.history.newestTime) {
       // A recording that was taken back.
       const { clock } = this;

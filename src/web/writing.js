@@ -50,8 +50,9 @@ export function writeNumbers(card, heading) {
   show(parts.speed, Math.hypot(...now.rate), 2);
   say(parts.seq, whole(now.seq));
   parts.seq.value = String(now.seq);
-  say(parts.stamp, clockTime(now.time, 3));
   const flags = now.isHeld ? [] : (last?.status ?? []).filter((flag) => !USUAL.has(flag));
+  // Who had ended, and alone began its clock, is at no time.
+  say(parts.stamp, flags.includes("last") && now.time === 0 ? "–" : clockTime(now.time, 3));
   say(parts.flags, flags.join(" "));
   parts.flags.title = flags.includes("last") ? "The last there was when this page came; none since." : "";
   say(parts.held, card.held ? `at ${clockTime(now.time, 3)}` : "");
