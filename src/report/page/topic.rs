@@ -117,7 +117,7 @@ fn integrated(s: &TopicSummary, is_damaged: bool, stretches: Option<usize>, out:
         out.push_str("<h3>Calibration learned on the way</h3>\n");
         let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
         out.push_str(&folded(
-            "bias, scale and axes",
+            "bias, scale and misalignment",
             &table("numbers", &head, &learned),
         ));
         out.push_str("<p class=\"small\">One sigma. What the motion does not show stays near nothing, with the sigma it had at first.</p>\n");
@@ -128,7 +128,7 @@ fn integrated(s: &TopicSummary, is_damaged: bool, stretches: Option<usize>, out:
 fn smoothed(smoothing: &Smoothing, drawn: Option<&Drawn>, out: &mut String) {
     out.push_str("<h3>Calibration by the whole recording</h3>\n");
     let learned = table("numbers", &Smoothing::HEAD, &smoothing.learned());
-    out.push_str(&folded("bias, scale and axes", &learned));
+    out.push_str(&folded("bias, scale and misalignment", &learned));
     out.push_str("<p class=\"small\">One sigma, after and before. What the motion does not show stays near nothing, with the sigma it had: it is not observed. Axes are small turns: xy is how far x reads y.</p>\n");
     let Some(drawn) = drawn else { return };
     for (id, chart) in charts::sizes(smoothing.sizes(), drawn) {

@@ -230,7 +230,7 @@ impl FilterSummary {
                 Severity::Warning,
                 "beyond-class",
                 format!(
-                    "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma was too small until that was seen",
+                    "the sensor is farther off than those of class {noise} are (scale {} %, misalignment {} deg, accelerometer {} m/s^2): sigma was too small until that was seen",
                     largest(&self.calibration.scale, 100.0),
                     largest(&self.calibration.cross, 1f64.to_degrees()),
                     largest(&self.calibration.force_bias, 1.0),
