@@ -18,8 +18,12 @@ pub struct LoneZeros {
 }
 
 impl LoneZeros {
-    /// Takes rates, rad/s.
+    /// Takes rates, rad/s. Behind what is no number a count begins anew.
     pub fn push(&mut self, rates: &[f64; 3]) {
+        if !rates.iter().all(|rate| rate.is_finite()) {
+            (self.run, self.before) = (0, None);
+            return;
+        }
         let largest = rates
             .iter()
             .fold(0.0, |most: f64, rate| most.max(rate.abs()));
@@ -61,5 +65,7 @@ mod tests {
         // A gyro in steps of 1 deg/s at rest, and a motion so slow that the noise goes through zero.
         assert_eq!(count(&[0.01745, 0.0, 0.01745, 0.0, -0.01745]), 0);
         assert_eq!(count(&[0.1, 0.0, 0.1]), 1);
+        // What is no number is no zero, and nothing is known of its neighbours.
+        assert_eq!(count(&[1.0, f64::NAN, 1.0, f64::NAN, 0.0, 1.0]), 0);
     }
 }

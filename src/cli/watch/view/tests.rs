@@ -127,10 +127,10 @@ fn the_silent_stand_behind_those_that_speak_in_a_line_each() {
         lines[0],
         (Tone::Silent, "a  flu in start  silent for 42 s".to_owned())
     );
-    let (tone, text) = lines
-        .iter()
-        .find(|(_, text)| text.contains("lost "))
-        .unwrap();
+    let found = lines.iter().find(|(_, text)| text.contains("lost "));
+    let Some((tone, text)) = found else {
+        unreachable!("{lines:?}")
+    };
     assert!(
         *tone == Tone::Silent && text.ends_with("silent for 42 s"),
         "{text}"
