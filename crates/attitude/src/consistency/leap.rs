@@ -9,15 +9,16 @@ use super::blocks::Block;
 use super::segment::half_turn;
 use crate::record::Nanos;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::collections::VecDeque;
 
 /// Length of either side, ns, and its least number of blocks.
 const SIDE_NANOS: i64 = 900_000_000;
 const SHORTEST_NANOS: i64 = 800_000_000;
 const LEAST_BLOCKS: usize = 15;
+/// Most blocks of both sides, which are 20 ms and more.
+const MOST_BLOCKS: usize = 96;
 /// Blocks next to the leap that hold nearly all of it.
 const NEXT: usize = 3;
-/// Least difference of two forces about a block, g, that is worth a look.
-const COARSE: f64 = 0.2;
 /// Least leap of the mean force in the integrated frame, g: 20 degrees.
 const LEAST: f64 = 0.35;
 /// Share of it that the next blocks hold. Of vibration they hold more than all.
@@ -47,8 +48,13 @@ pub struct GravityLeap {
 }
 
 /// Watch over leaps.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Leaps {
+    /// Forces of the newest blocks of the run, in the frame of its first.
+    forces: VecDeque<Vector3<f64>>,
+    /// Rotation to that frame at the end of the newest, and when that is.
+    attitude: Quaternion<f64>,
+    end: Option<Nanos>,
     first: Option<(GravityLeap, f64)>,
     last: Option<Nanos>,
 }
@@ -61,7 +67,8 @@ impl Leaps {
 
     /// Looks at the end of a run of blocks whose force is `gravity` long at rest.
     pub(super) fn look(&mut self, run: &[Block], gravity: f64) {
-        let Some((leap, ratio)) = leap(run, gravity) else {
+        self.follow(run);
+        let Some((leap, ratio)) = leap(run, &self.forces, gravity) else {
             return;
         };
         let is_another = |last: Nanos| leap.at.since(last) >= APART_NANOS;
@@ -76,48 +83,75 @@ impl Leaps {
         }
         self.last = Some(leap.at);
     }
+
+    /// Turns the force of the newest block into the frame of the run.
+    fn follow(&mut self, run: &[Block]) {
+        let Some(newest) = run.last() else { return };
+        let before = run.len().checked_sub(2).and_then(|at| run.get(at));
+        if before.is_none_or(|block| self.end != Some(block.end)) {
+            self.forces.clear();
+            self.attitude = Quaternion::identity();
+        }
+        let half = half_turn(&newest.angle);
+        self.attitude *= half;
+        let force = UnitQuaternion::new_unchecked(self.attitude) * newest.force;
+        self.attitude *= half;
+        self.forces.push_back(force);
+        while self.forces.len() > run.len().min(MOST_BLOCKS) {
+            self.forces.pop_front();
+        }
+        self.end = Some(newest.end);
+    }
 }
 
-/// Leap in the block that lies one side's length before the end of the run, and the scatter of both sides by it.
-fn leap(run: &[Block], gravity: f64) -> Option<(GravityLeap, f64)> {
+/// Leap in the block that lies one side's length before the end of the run, and the scatter of both sides by it; of
+/// the last blocks also the forces in one frame.
+fn leap(
+    run: &[Block],
+    forces: &VecDeque<Vector3<f64>>,
+    gravity: f64,
+) -> Option<(GravityLeap, f64)> {
+    let run = run.get(run.len().checked_sub(forces.len())?..)?;
     let end = run.last()?.end;
     let behind_from = run.partition_point(|block| end.since(block.end) >= SIDE_NANOS);
     let middle = behind_from.checked_sub(1)?;
-    let (before, behind) = (run.get(..middle)?, run.get(behind_from..)?);
-    let (own, earlier, later) = (run.get(middle)?, before.last()?, behind.first()?);
-    if (later.force - earlier.force).norm_squared() < (COARSE * gravity).powi(2) {
+    let (own, earlier, later) = (
+        run.get(middle)?,
+        run.get(middle.checked_sub(1)?)?,
+        run.get(behind_from)?,
+    );
+    let part = |from: usize, to: usize| forces.range(from..to).map(|force| force / gravity);
+    let close = middle.checked_sub(NEXT)?;
+    let far = (behind_from + NEXT).min(run.len());
+    let next = mean(part(behind_from, far)) - mean(part(close, middle));
+    if next.norm() < SHARP.start * LEAST {
         return None;
     }
-    let from = before.partition_point(|block| own.start.since(block.start) > SIDE_NANOS);
-    let before = before.get(from..)?;
+    let before_from = run.partition_point(|block| own.start.since(block.start) > SIDE_NANOS);
     let is_close = |block: &Block| block.secs() <= LONGEST_SECS;
-    let is_whole = before.len().min(behind.len()) >= LEAST_BLOCKS
-        && own.start.since(before.first()?.start) >= SHORTEST_NANOS
+    let is_whole = middle
+        .saturating_sub(before_from)
+        .min(run.len() - behind_from)
+        >= LEAST_BLOCKS
+        && own.start.since(run.get(before_from)?.start) >= SHORTEST_NANOS
         && [own, earlier, later].into_iter().all(is_close)
         && own.angle.norm() <= TURN;
     if !is_whole {
         return None;
     }
-    let mut attitude = Quaternion::identity();
-    let mut in_one_frame = |block: &Block| {
-        let half = half_turn(&block.angle);
-        attitude *= half;
-        let force = UnitQuaternion::new_unchecked(attitude) * block.force / gravity;
-        attitude *= half;
-        force
-    };
-    let before: Vec<Vector3<f64>> = before.iter().map(&mut in_one_frame).collect();
-    in_one_frame(own);
-    let behind: Vec<Vector3<f64>> = behind.iter().map(&mut in_one_frame).collect();
-    let (mean_before, mean_behind) = (mean(before.iter()), mean(behind.iter()));
+    let (before, behind) = (
+        || part(before_from, middle),
+        || part(behind_from, run.len()),
+    );
+    let (mean_before, mean_behind) = (mean(before()), mean(behind()));
     let by = mean_behind - mean_before;
     let size = by.norm();
-    let next = mean(behind.iter().take(NEXT)) - mean(before.iter().rev().take(NEXT));
-    let squares = |all: &[Vector3<f64>], mean: Vector3<f64>| -> f64 {
-        all.iter().map(|force| (force - mean).norm_squared()).sum()
+    let squares = |all: &mut dyn Iterator<Item = Vector3<f64>>, mean: Vector3<f64>| -> f64 {
+        all.map(|force| (force - mean).norm_squared()).sum()
     };
-    let sum = squares(&before, mean_before) + squares(&behind, mean_behind);
-    let scatter = (sum / (before.len() + behind.len()) as f64).sqrt();
+    let sum = squares(&mut before(), mean_before) + squares(&mut behind(), mean_behind);
+    let count = middle - before_from + run.len() - behind_from;
+    let scatter = (sum / count as f64).sqrt();
     let is_leap = size >= LEAST
         && scatter <= LARGEST_RATIO * size
         && SHARP.contains(&(next.dot(&by) / (size * size)))
@@ -132,7 +166,7 @@ fn leap(run: &[Block], gravity: f64) -> Option<(GravityLeap, f64)> {
     is_leap.then_some((leap, scatter / size))
 }
 
-fn mean<'a>(all: impl Iterator<Item = &'a Vector3<f64>>) -> Vector3<f64> {
+fn mean(all: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
     let (sum, n) = all.fold((Vector3::zeros(), 0.0), |(sum, n), v| (sum + v, n + 1.0));
     sum / f64::max(n, 1.0)
 }
