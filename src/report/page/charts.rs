@@ -213,18 +213,8 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
     };
     let errors = trace.points(error, time.nanos);
     let mut above = trace.points(three, time.nanos);
-    // What was not known at the very beginning, or after a reset, would flatten all else.
-    let mut sizes: Vec<f64> = above
-        .iter()
-        .map(|p| p[1])
-        .filter(|v| v.is_finite())
-        .collect();
-    sizes.sort_by(f64::total_cmp);
-    let ordinary = sizes.get(sizes.len() * 9 / 10).copied().unwrap_or(0.0);
-    let largest = errors.iter().map(|p| p[1].abs()).fold(ordinary, f64::max);
-    for point in above.iter_mut().filter(|p| p[1] > ROOM * largest) {
-        point[1] = f64::NAN;
-    }
+    let largest = errors.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
+    leave_out_giants(&mut above, largest);
     let mut lines = vec![line("error", 3, errors)];
     if part == Bounded::Heading {
         let below = above.iter().map(|[x, y]| [*x, -*y]).collect();
@@ -232,6 +222,22 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
     }
     lines.push(bound("3 sigma", above, 1));
     over_time(time, title, "deg", lines)
+}
+
+/// Size that nine of ten points do not exceed.
+fn ordinary(points: &[[f64; 2]]) -> f64 {
+    let sizes = points.iter().map(|p| p[1].abs());
+    let mut sizes: Vec<f64> = sizes.filter(|v| v.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() * 9 / 10).copied().unwrap_or(0.0)
+}
+
+/// Leaves out of a bound what was not known at the very beginning, or after a reset, and would flatten all else.
+fn leave_out_giants(bound: &mut [[f64; 2]], shown: f64) {
+    let most = ROOM * ordinary(bound).max(shown);
+    for point in bound.iter_mut().filter(|p| p[1] > most) {
+        point[1] = f64::NAN;
+    }
 }
 
 /// Innovations between three sigma of what was expected: gravity, and heading where a field
@@ -253,17 +259,11 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
         if lines.iter().all(|series| series.points.is_empty()) {
             continue;
         }
-        // Bounds far from everything would flatten it.
-        let values = lines.iter().flat_map(|series| &series.points);
-        let largest = values.map(|p| p[1].abs()).fold(0.0, f64::max);
-        let shown = |y: f64| if y > 3.0 * largest { f64::NAN } else { y };
-        let bounds = |sign: f64| {
-            of(three)
-                .iter()
-                .map(|[x, y]| [*x, sign * shown(*y)])
-                .collect()
-        };
-        let (above, below) = (bounds(1.0), bounds(-1.0));
+        // One that begins far off is no reason to show how little was known then.
+        let values: Vec<[f64; 2]> = lines.iter().flat_map(|s| s.points.clone()).collect();
+        let mut above = of(three);
+        leave_out_giants(&mut above, ordinary(&values));
+        let below = above.iter().map(|[x, y]| [*x, -*y]).collect();
         lines.extend([bound("3 sigma", above, 4), bound("", below, 4)]);
         charts.push(over_time(time, title, "deg", lines));
     }

@@ -16,7 +16,7 @@ use crate::text::printable;
 use std::collections::BTreeMap;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::setting::FIELD;
+use strapd_attitude::setting::{ACCEL_TOPIC, FIELD, MAG_TOPIC};
 
 /// A topic, and how it is read.
 #[derive(Debug)]
@@ -85,12 +85,21 @@ impl<'l> TopicPlan<'l> {
             return Err(Error::unsupported(path, why));
         };
         if !decoder.stated().has_gyro {
-            let what = format!(
-                "{} ({}): carries no body rate",
-                printable(&self.source.name),
-                described(&first.channel)
-            );
-            let what = Diagnostic::new(what).help(format!("{FIELD} gyro=PATH names one"));
+            let name = printable(&self.source.name);
+            let stated = decoder.stated();
+            let (carries, beside) = match (stated.has_mag, stated.has_accel) {
+                (true, _) => ("a magnetic field and no body rate", Some(MAG_TOPIC)),
+                (_, true) => ("forces and no body rate", Some(ACCEL_TOPIC)),
+                _ => ("no body rate", None),
+            };
+            let what = format!("{name} ({}): carries {carries}", described(&first.channel));
+            let help = match beside {
+                Some(beside) => format!(
+                    "{beside} {name} takes it beside the rates of another topic; {FIELD} gyro=PATH names a rate in it"
+                ),
+                None => format!("{FIELD} gyro=PATH names one"),
+            };
+            let what = Diagnostic::new(what).help(help);
             return Err(Error::unsupported(path, what));
         }
         Ok((*first, decoder))
