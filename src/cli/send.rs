@@ -14,6 +14,7 @@ use crate::config::selection;
 use crate::error::{Error, Result};
 use crate::pipeline::opening;
 use crate::pipeline::pace::Pace;
+use crate::sink::UNAUTHORISED;
 use clap::Args;
 use serde_json::json;
 use std::ops::ControlFlow;
@@ -219,9 +220,9 @@ pub(super) fn with_help(what: String, has_token: bool) -> Diagnostic {
     let says = |words: &[&str]| words.iter().any(|word| what.contains(word));
     let help = if says(&["Connection refused", "connection refused", "No such file"]) {
         "is `strapd serve` running there? ADDRESS names where it listens"
-    } else if says(&["unauthorised", "bad_auth", "401"]) && !has_token {
+    } else if says(&[UNAUTHORISED, "bad_auth", "401"]) && !has_token {
         "--token-file FILE shows the daemon's token (or STRAPD_TOKEN_FILE)"
-    } else if says(&["unauthorised", "bad_auth", "401"]) {
+    } else if says(&[UNAUTHORISED, "bad_auth", "401"]) {
         "--token-file: the first line of FILE is to be the daemon's token"
     } else {
         return what.into();

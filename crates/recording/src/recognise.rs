@@ -210,14 +210,10 @@ pub fn marked(first: &[u8], last: &[u8]) -> Option<Foreign> {
             "download the log itself",
         );
     }
-    for (word, name) in MARKED_UP {
-        if text
-            .get(..text.len().min(600))
-            .is_some_and(|head| contains(head, word))
-            && text.starts_with(b"<")
-        {
-            return of(name, NO_SAMPLES);
-        }
+    let head = text.get(..text.len().min(600)).unwrap_or(text);
+    let mut elements = MARKED_UP.iter().filter(|_| head.starts_with(b"<"));
+    if let Some((_, name)) = elements.find(|(word, _)| contains(head, word)) {
+        return of(name, NO_SAMPLES);
     }
     if starts_like(text, b"<?xml") {
         return of("a text in XML", NO_SAMPLES);

@@ -53,6 +53,7 @@ pub use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub use output::{is_named, no_folder, sync_directory};
+pub use socket::UNAUTHORISED;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 pub use stream::{ChildFrames, Content, FrameNames, Provenance, Stream, output_topic};

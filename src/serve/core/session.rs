@@ -27,6 +27,7 @@ use crate::serve::guard::log_throttle;
 use crate::serve::guard::peer::Peer;
 use crate::serve::protocol::upstream::Event;
 use crate::serve::protocol::wire;
+use crate::sink::UNAUTHORISED;
 use bytes::Bytes;
 use opening::Opening;
 use rows::Rows;
@@ -388,7 +389,7 @@ impl Session {
 
 fn first_line_must_be_auth() -> Fault {
     Fault::new(
-        "unauthorised",
+        UNAUTHORISED,
         "the first line must be {\"class\":\"AUTH\",\"token\":\"...\"}",
     )
 }

@@ -6,6 +6,7 @@
 
 use super::http::answer::{refusal, response};
 use super::http::connection::Connection;
+use crate::sink::UNAUTHORISED;
 use axum::body::Body as Answer;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};
@@ -238,7 +239,7 @@ pub(in crate::serve) async fn answer(
     if connection.hub.token().is_some() && !connection.trusted {
         return refusal(
             StatusCode::UNAUTHORIZED,
-            "unauthorised",
+            UNAUTHORISED,
             "Authorization: Bearer TOKEN is needed",
         );
     }

@@ -5,6 +5,7 @@
 
 use super::failed_logins::Strangers;
 use super::fault::Fault;
+use crate::sink::UNAUTHORISED;
 use sha2::{Digest, Sha256};
 use std::net::IpAddr;
 use std::sync::{Mutex, PoisonError};
@@ -53,7 +54,7 @@ impl Token {
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
         Err(Denied {
-            fault: Fault::new("unauthorised", "the token is wrong"),
+            fault: Fault::new(UNAUTHORISED, "the token is wrong"),
             delay: strangers.failed(from, now),
         })
     }

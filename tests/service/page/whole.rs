@@ -56,6 +56,31 @@ fn seek(to: f64) -> String {
 
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn the_rate_of_samples_is_that_of_the_sensor_without_its_reference() {
+    let process = played(&["--speed", "1"]);
+    let mut browser = Browser::start();
+    browser.go(process.address(0), "/");
+    browser.until_open();
+    until_whole(&mut browser, "/imu/data");
+    browser.eval("document.querySelector('[data-testid=play]').click()");
+    // 50 Hz, and with the recorded orientation 100: a page that is drawn late sees some more or fewer of them.
+    browser.until(
+        "a rate of samples",
+        "parseFloat(document.querySelector('[data-testid=health-rate]').textContent) > 20",
+    );
+    let rate = "parseFloat(document.querySelector('[data-testid=health-rate]').textContent)";
+    let mut rates: Vec<f64> = (0..5)
+        .map(|_| {
+            std::thread::sleep(Duration::from_millis(1100));
+            browser.eval(rate).as_f64().unwrap()
+        })
+        .collect();
+    rates.sort_by(f64::total_cmp);
+    assert!((rates[2] - 50.0).abs() < 20.0, "{rates:?}");
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_tab_that_comes_after_the_end_sees_curves_over_the_whole_axis() {
     let process = played(&["--speed", "100"]);
     let mut client = Client::web(process.address(0))

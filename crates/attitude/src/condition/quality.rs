@@ -350,7 +350,6 @@ impl Quality {
         let held = self.previous == Some(gyro);
         self.so_far.repeated_rows += u64::from(held);
         self.zeros.push(&gyro);
-        self.so_far.lone_zero_rows = self.zeros.count();
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         // A motion goes on, and is no word for nothing on every axis (-999, 655.35).

@@ -373,7 +373,7 @@ impl Evidence {
         let sums = (0..UPS.len()).map(|up| (up, sum(up)));
         let (up, evidence) = sums.max_by(|(_, some), (_, other)| some.total_cmp(other))?;
         let best = self.sums.iter().copied().fold(0.0, f64::max);
-        let stands_out = evidence - best >= (0.15 * evidence).max(4.0);
+        let stands_out = is_peak(evidence, best);
         // In a curve the force tilts, and yaw about the tilted force leaves it where it is: as no rotation does.
         let is_curve = self.sums.get(MAPS).is_none_or(|nothing| *nothing > 0.0);
         if evidence < LEAST_EVIDENCE || !stands_out || is_curve {
@@ -469,7 +469,7 @@ impl Evidence {
         let rows = || self.rows.iter().skip(from);
         let beyond = rows().filter(|row| row.is_beyond).count() as f64;
         let (simplest, nothing) = (simplest(sums, &near)?, sums[MAPS]);
-        let has_peak = sums[simplest] - nothing >= (0.15 * sums[simplest]).max(4.0);
+        let has_peak = is_peak(sums[simplest], nothing);
         let is_beyond = beyond >= BEYOND_SHARE * count as f64;
         let is_in_degrees = !has_peak && is_beyond && near.contains(&DEGREES);
         let chosen = if is_in_degrees { DEGREES } else { simplest };
@@ -556,6 +556,11 @@ fn simplest(sums: &[f64], near: &[usize]) -> Option<usize> {
 /// Evidence of a segment for a map under which gravity scatters by `found` against one under which it does by `other`.
 pub(super) fn evidence(other: f64, found: f64) -> f64 {
     (other / found).ln().clamp(-CLIP, CLIP)
+}
+
+/// Whether evidence stands out from that of another explanation: by 4, and by 15 %.
+fn is_peak(evidence: f64, other: f64) -> bool {
+    evidence - other >= (0.15 * evidence).max(4.0)
 }
 
 /// Median of some scatters, g.

@@ -161,14 +161,24 @@ fn rotates(side: &[Row]) -> bool {
     side.iter().filter(|row| row.rotates).count() >= ROTATING || (squares / n).sqrt() >= POSES
 }
 
-/// The cut by which two biases gain most on one under which `left` is left of each segment.
-fn cut(rows: &[Row], left: &[f64]) -> Option<usize> {
-    let weighted = |(row, left): (&Row, &f64)| {
+/// Normal matrix of a bias, and its right side.
+type Normal = (Matrix3<f64>, Vector3<f64>);
+
+/// Parts of segments of which so much is left, the less of it the more they weigh.
+fn weighted(rows: &[Row], left: &[f64]) -> impl Iterator<Item = Normal> {
+    rows.iter().zip(left).map(|(row, left)| {
         let weight = 1.0 / (left + FULL);
         (row.scatter.a * weight, row.scatter.b * weight)
-    };
-    let all: Vec<_> = rows.iter().zip(left).map(weighted).collect();
-    let add = |(a, b): (Matrix3<f64>, Vector3<f64>), (c, d): &(_, _)| (a + c, b + d);
+    })
+}
+
+fn add((normal, slope): Normal, (other, by): &Normal) -> Normal {
+    (normal + other, slope + by)
+}
+
+/// The cut by which two biases gain most on one under which `left` is left of each segment.
+fn cut(rows: &[Row], left: &[f64]) -> Option<usize> {
+    let all: Vec<Normal> = weighted(rows, left).collect();
     let none = (Matrix3::zeros(), Vector3::zeros());
     let (normal, slope) = all.iter().fold(none, add);
     let gain = |normal: Matrix3<f64>, slope: Vector3<f64>| -> Option<f64> {
@@ -202,15 +212,7 @@ fn fit(rows: &[Row]) -> Option<Fit> {
     };
     let sums = |left: &[f64]| {
         let none = (Matrix3::zeros(), Vector3::zeros());
-        rows.iter()
-            .zip(left)
-            .fold(none, |(normal, slope), (row, left)| {
-                let weight = 1.0 / (left + FULL);
-                (
-                    normal + row.scatter.a * weight,
-                    slope + row.scatter.b * weight,
-                )
-            })
+        weighted(rows, left).fold(none, |sum, part| add(sum, &part))
     };
     let mut bias = Vector3::zeros();
     for _ in 0..2 {

@@ -23,7 +23,7 @@ const NEXT: usize = 3;
 const LEAST: f64 = 0.35;
 /// Share of it that the next blocks hold. Of vibration they hold more than all.
 const SHARP: std::ops::Range<f64> = 0.7..1.4;
-/// Scatter of the force on either side about its mean, by the leap: 0.40 and more of 24 recordings as recorded, 0.01 to
+/// Scatter of the force on either side about its mean, by the leap: 0.38 and more of 24 recordings as recorded, 0.01 to
 /// 0.24 of axes that change on hands, arms, drones, cars, and of what rests.
 const LARGEST_RATIO: f64 = 0.25;
 /// Mean force on either side by gravity.

@@ -15,7 +15,7 @@ use strapd_attitude::frames::AxisMap;
 use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 
 /// Codes of the findings here that name a cause.
-const AXES: &str = "gyro-axes";
+pub(super) const AXES: &str = "gyro-axes";
 const SCALE: &str = "gyro-scale";
 const TURNED: &str = "gyro-turned";
 /// Findings that have only a guess where a cause is named.

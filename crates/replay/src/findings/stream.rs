@@ -2,6 +2,7 @@
 //!
 //! Apart from the counts of a run because the advice depends on who reads it: a recording is split, a sender is mended.
 
+use super::sensors::AXES;
 use super::{Finding, Severity, sensors};
 use crate::finding::{
     ACCEL_UNIT_CHANGE, GRAVITY_LEAP, GYRO_AXES_CHANGE, GYRO_BIAS_CHANGE, GYRO_UNIT_CHANGE, MIXED,
@@ -16,7 +17,7 @@ use strapd_attitude::setting::{COLUMNS, GYRO_AXES, GYRO_UNIT, START, TOPIC, UNTI
 /// Findings about gyro and gravity that these explain, beside those of a misread sensor.
 const EXPLAINED: [&str; 2] = ["gyro-against-gravity", "unit-against-gravity"];
 /// Findings that name the cause of a leap of gravity.
-const LEAPS: [&str; 4] = [MIXED, ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, "gyro-axes"];
+const LEAPS: [&str; 4] = [MIXED, ACCEL_UNIT_CHANGE, GYRO_AXES_CHANGE, AXES];
 /// Ratio of two units by which readings change, less 1.
 const NEAR: f64 = 0.15;
 /// Findings from the report of a stream: of a recording, or live.

@@ -17,7 +17,7 @@ const STALLED: Duration = Duration::from_secs(30);
 /// Time that the other side may take to read the rest and close.
 const CLOSE: Duration = Duration::from_secs(2);
 /// Code of a daemon's answer to who shows no token.
-const UNAUTHORISED: &str = "unauthorised";
+pub const UNAUTHORISED: &str = "unauthorised";
 /// Longest answer that is looked at.
 const MAX_ANSWER: u64 = 64 << 10;
 

@@ -1,5 +1,6 @@
 //! Answer -> a response with the headers that all of them have. Pure.
 
+use crate::sink::UNAUTHORISED;
 use axum::body::Body;
 use axum::http::{HeaderValue, Response, StatusCode, header};
 
@@ -38,7 +39,7 @@ pub(in crate::serve) fn response(
 pub(in crate::serve) fn unauthorised() -> Response<Body> {
     refusal(
         StatusCode::UNAUTHORIZED,
-        "unauthorised",
+        UNAUTHORISED,
         "Authorization: Bearer TOKEN is needed",
     )
 }

@@ -168,6 +168,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         accel_at_rest: accel.map(|a| a.norm()),
         gravity: accel.and_then(gravity),
         gyro_against_gravity: quality.gravity.result(),
+        lone_zero_rows: quality.zeros.count(),
         ..so_far
     }
 }
