@@ -146,6 +146,15 @@ impl Status {
     pub fn is_lossy(&self) -> bool {
         self.unrecorded > 0 || self.stopped.is_some()
     }
+
+    /// Counts a sync that made `bytes` of the file number `file` (from 1) durable. A sync takes as long as the disk
+    /// does: its file may have ended, and been synced whole, before this outcome arrives.
+    fn count_sync(&mut self, file: usize, bytes: u64) {
+        if file == self.files.len() && bytes >= self.synced {
+            self.syncs += 1;
+            self.synced = bytes;
+        }
+    }
 }
 
 /// Message to the worker.
@@ -308,5 +317,28 @@ impl Recorder {
 impl Drop for Recorder {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sync_that_is_done_late_takes_nothing_back() {
+        let mut status = Status {
+            files: vec!["a.mcap".into()],
+            ..Status::default()
+        };
+        status.count_sync(1, 100);
+        status.count_sync(1, 300);
+        status.count_sync(1, 200);
+        assert_eq!((status.syncs, status.synced), (2, 300));
+        status.files.push("a.1.mcap".into());
+        (status.syncs, status.synced) = (0, 20);
+        status.count_sync(1, 400);
+        assert_eq!((status.syncs, status.synced), (0, 20));
+        status.count_sync(2, 50);
+        assert_eq!((status.syncs, status.synced), (1, 50));
     }
 }

@@ -8,31 +8,30 @@ use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-/// A file, how much of it there is, and where the outcome goes.
-type Request = (Arc<File>, u64);
+/// A file, its number in the recording (from 1), and how much of it there is.
+type Request = (Arc<File>, usize, u64);
 
 /// The thread's end.
 #[derive(Debug)]
 pub(super) struct Syncer {
     sender: Option<SyncSender<Request>>,
     thread: Option<JoinHandle<()>>,
+    shared: Arc<Shared>,
 }
 
 impl Syncer {
     pub(super) fn start(shared: Arc<Shared>) -> std::io::Result<Syncer> {
         // One waits while one is under way; more would sync the same again.
         let (sender, receiver) = sync_channel::<Request>(1);
+        let outcomes = shared.clone();
         let thread = std::thread::Builder::new()
             .name("strapd-sync".to_owned())
             .spawn(move || {
-                for (file, bytes) in receiver {
+                for (file, number, bytes) in receiver {
                     let outcome = file.sync_data();
-                    let mut status = shared.status();
+                    let mut status = outcomes.status();
                     match outcome {
-                        Ok(()) => {
-                            status.syncs += 1;
-                            status.synced = bytes;
-                        }
+                        Ok(()) => status.count_sync(number, bytes),
                         Err(e) => {
                             status
                                 .stopped
@@ -44,14 +43,16 @@ impl Syncer {
         Ok(Syncer {
             sender: Some(sender),
             thread: Some(thread),
+            shared,
         })
     }
 
-    /// Asks for a sync; `false` when the last ones are not done.
+    /// Asks for a sync of the present file; `false` when the last ones are not done.
     pub(super) fn request(&self, file: &Arc<File>, bytes: u64) -> bool {
+        let number = self.shared.status().files.len();
         self.sender
             .as_ref()
-            .is_some_and(|s| s.try_send((file.clone(), bytes)).is_ok())
+            .is_some_and(|s| s.try_send((file.clone(), number, bytes)).is_ok())
     }
 }
 

@@ -293,8 +293,8 @@ impl Worker {
         status.bytes = self.earlier + file.bytes;
         match outcome {
             Ok(()) => {
-                status.syncs += 1;
-                status.synced = file.bytes;
+                let number = status.files.len();
+                status.count_sync(number, file.bytes);
             }
             Err(error) => {
                 tracing::error!("recording: {error}\n  help: strapd recover reads what is there");
