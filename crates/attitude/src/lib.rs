@@ -68,6 +68,7 @@ pub mod estimate;
 pub mod frames;
 pub mod joint;
 mod median;
+mod mixture;
 pub mod noise;
 pub mod plausible;
 pub mod propagate;

@@ -7,12 +7,11 @@
 use super::covariance::SCALE;
 use super::filter::{COLOURED, Filter, WIDE};
 use super::other_class::{ClassDoubt, NUMBERS, OtherClass};
+use crate::mixture::share_of_variance;
 use nalgebra::{Cholesky, Const, Matrix3, SMatrix, SVector};
 
 /// Corrections after which the class is weighed again: 10 s.
 const OFTEN: u64 = 100;
-/// Probability of a class that adds nothing any more.
-const NEGLIGIBLE: f64 = 1e-3;
 type Matrix = SMatrix<f64, NUMBERS, NUMBERS>;
 type Vector = SVector<f64, NUMBERS>;
 
@@ -97,11 +96,8 @@ impl Filter {
     /// Derives from the state what the other class adds.
     pub(super) fn weigh_classes(&mut self) {
         if let Some(mut doubt) = self.derived.doubt {
-            let probability = self.other_class_probability();
-            doubt.weights = match probability {
-                ..NEGLIGIBLE => [0.0; NUMBERS],
-                _ => self.weights(&doubt.other, probability),
-            };
+            let share = share_of_variance(self.other_class_probability());
+            doubt.weights = self.weights(&doubt.other, share);
             self.derived.doubt = Some(doubt);
         }
     }
@@ -121,9 +117,9 @@ impl Filter {
         own
     }
 
-    fn weights(&self, other: &OtherClass, probability: f64) -> [f64; NUMBERS] {
+    fn weights(&self, other: &OtherClass, share: f64) -> [f64; NUMBERS] {
         let [own, other] =
             [self.held(), *other].map(|class| class.sigmas().map(|sigma| sigma * sigma));
-        std::array::from_fn(|i| probability * (other[i] - own[i]).max(0.0) / (own[i] * own[i]))
+        std::array::from_fn(|i| share * (other[i] - own[i]).max(0.0) / (own[i] * own[i]))
     }
 }

@@ -80,10 +80,13 @@ impl Filter {
                 + by_velocity * self.state.velocity[i]
                 + by_position * self.state.position[i]
         });
+        // Of a body that leans as far as gravity is believed by half, nothing is withheld for that.
+        let upright = (2.0 * self.state.vertical.withheld().1 - 1.0).max(0.0);
+        let turn = (self.turned_about_vertical(), upright);
         let mut variance =
             self.state
                 .residuals
-                .variance(secs, residual, &force.acceleration, &settings);
+                .variance(secs, residual, &force.acceleration, turn, &settings);
         if self.rests() {
             let (ax, ay) = (force.acceleration.x, force.acceleration.y);
             let square = ax * ax + ay * ay;
@@ -98,10 +101,16 @@ impl Filter {
                 variance = floor + 0.01;
             }
         }
+        let gravity = settings.gravity;
+        let up = if settings.tilt_by_gravity {
+            gravity
+        } else {
+            force.up
+        };
         for i in 0..2 {
             let [x, y, z, lead] = force.by_calibration[i];
             // A tilt about y makes gravity seem to point along x, one about x against y.
-            let (tilt, by_tilt) = [(TILT + 1, force.up), (TILT, -force.up)][i];
+            let (tilt, by_tilt) = [(TILT + 1, up), (TILT, -up)][i];
             let h = [
                 (tilt, by_tilt),
                 (FORCE_BIAS, x),
@@ -118,9 +127,15 @@ impl Filter {
                 self.state.vertical.withheld(),
                 correction,
             );
-            let gravity = settings.gravity;
             self.derived.innovation.gravity[i] = (left / gravity, sigma / gravity);
         }
+    }
+
+    /// Angle that the body has turned about the vertical in this interval, rad.
+    fn turned_about_vertical(&self) -> f64 {
+        let sums = &self.state.interval;
+        let up = sums.attitude.row(2).transpose() / sums.secs;
+        up.dot(&(sums.rate - self.state.calibration.bias * sums.secs))
     }
 
     fn reference_is_left(&self) -> bool {

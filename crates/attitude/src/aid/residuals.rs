@@ -4,6 +4,9 @@ use super::settings::Settings;
 use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 
+/// Time over which residuals are averaged to see what turns with the body, s.
+const TURNING_SECS: f64 = 5.0;
+
 /// Statistics of residuals.
 #[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -17,6 +20,9 @@ pub(super) struct Residuals {
     square: f64,
     product: f64,
     last: [f64; 2],
+    /// Means over seconds, m/s^2: along earth axes, and along axes that turn about the vertical with the body.
+    #[cfg_attr(feature = "serde", serde(default))]
+    means: [[f64; 2]; 2],
 }
 
 impl Residuals {
@@ -33,14 +39,17 @@ impl Residuals {
             .into_iter()
             .all(is_amount)
             && are_numbers(self.last.iter().chain([&self.product]))
+            && are_numbers(self.means.iter().flatten())
     }
 
     /// The reference was left: what comes has nothing to do with what was.
     pub(super) fn restart(&mut self) {
         (self.square, self.product, self.last) = (0.0, 0.0, [0.0; 2]);
+        self.means = [[0.0; 2]; 2];
     }
 
-    /// Variance of the residual of an interval of `secs`, in which the acceleration (earth axes) is.
+    /// Variance of the residual of an interval of `secs`, in which the body has turned by `turned` rad about the vertical
+    /// and the acceleration (earth axes) is; `upright` says how far one axis of the body stays vertical, 0 to 1.
     ///
     /// A wrong tilt carries the velocity and the position of the reference off without bound, and the residual with
     /// them: were that taken for noise, gravity would be believed less and less. So a residual counts in proportion to
@@ -50,6 +59,7 @@ impl Residuals {
         secs: f64,
         residual: [f64; 2],
         acceleration: &Vector3<f64>,
+        (turned, upright): (f64, f64),
         settings: &Settings,
     ) -> f64 {
         let share = secs / (settings.force_secs + secs);
@@ -80,7 +90,65 @@ impl Residuals {
         } else {
             0.0
         };
+        let turning = self.turning([x, y], secs, turned, settings.force_turning * density);
+        let density = density + upright * turning;
         let colour = ((1.0 + likeness) / (1.0 - likeness)).powf(settings.colour);
         density / secs * colour
+    }
+
+    /// Power density of what turns about the vertical with the body, beyond `chance`.
+    ///
+    /// In a curve that is the acceleration towards its middle, which a gait hides in a mean square. While the body stays
+    /// upright it is the accelerometer's bias to the filter, or a tilt. What lasts along earth axes is not counted: where
+    /// a bias is not known yet it is the bias, and gravity is to tell it.
+    fn turning(&mut self, residual: [f64; 2], secs: f64, turned: f64, chance: f64) -> f64 {
+        let share = secs / (TURNING_SECS + secs);
+        let (sin, cos) = turned.sin_cos();
+        let [_, [x, y]] = self.means;
+        self.means[1] = [cos * x - sin * y, sin * x + cos * y];
+        for mean in &mut self.means {
+            for (mean, now) in mean.iter_mut().zip(residual) {
+                *mean += share * (now - *mean);
+            }
+        }
+        let [stays, turns] = self.means.map(|[x, y]| x * x + y * y);
+        // A mean of white noise has its density over twice that time, on each of two axes.
+        (TURNING_SECS * (turns - stays) - chance).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Variance after a minute of residuals of 5 m/s^2 to and fro, with `pull` m/s^2 more that turns by `turned` rad an
+    /// update, on a body that does.
+    fn hidden(pull: f64, turned: f64, settings: &Settings) -> f64 {
+        let mut residuals = Residuals::new(settings);
+        let mut variance = 0.0;
+        for k in 0..600 {
+            let (sin, cos) = (turned * f64::from(k)).sin_cos();
+            let gait = if k % 2 == 0 { 5.0 } else { -5.0 };
+            let residual = [gait + pull * cos, pull * sin];
+            let acceleration = Vector3::new(residual[0], residual[1], 0.0);
+            variance = residuals.variance(0.1, residual, &acceleration, (turned, 1.0), settings);
+        }
+        variance
+    }
+
+    #[test]
+    fn a_pull_that_turns_with_the_body_is_seen_under_a_gait_and_one_that_stays_is_left_to_the_bias()
+    {
+        let now = Settings::default();
+        let before = Settings {
+            force_turning: f64::INFINITY,
+            ..now
+        };
+        let more =
+            |pull: f64, turned: f64| hidden(pull, turned, &now) / hidden(pull, turned, &before);
+        assert!(more(2.0, 0.04) > 5.0, "{}", more(2.0, 0.04));
+        for nothing in [more(2.0, 0.0), more(0.0, 0.04), more(0.2, 0.04)] {
+            assert_eq!(nothing, 1.0);
+        }
     }
 }

@@ -69,6 +69,12 @@ pub struct Settings {
     /// Discount of residuals that resemble the ones before them; 0: none, 1: as for a
     /// process of first order.
     pub colour: f64,
+    /// Whether a tilt is looked for by gravity alone, not by the vertical acceleration with it: a body that moves along a
+    /// slant, as a runner does at each step, accelerates up and aside at once and is not tilted.
+    pub tilt_by_gravity: bool,
+    /// Power density of what turns with the body, as a multiple of that of the residuals, up to which it is chance;
+    /// infinite: all is.
+    pub force_turning: f64,
     /// Time between corrections, s.
     pub update_secs: f64,
     /// Time for which all must be quiet to be at rest, s.
@@ -162,6 +168,8 @@ impl Default for Settings {
             force_vertical: 0.1,
             force_carried: 30.0,
             colour: 1.1,
+            tilt_by_gravity: true,
+            force_turning: 2.0,
             update_secs: 0.1,
             rest_secs: 1.5,
             rest_lag: 0.5,

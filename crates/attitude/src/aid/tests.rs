@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod accelerated;
 mod clipped;
 mod drift;
 mod golden;

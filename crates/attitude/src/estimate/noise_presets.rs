@@ -53,7 +53,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         bias_instability: 10.0,
         turn_on_bias: 2.0,
         scale: 0.01,
-        misalignment: 0.012,
+        misalignment: 0.0175,
         tilt: 0.02,
         delay: 2e-3,
         sensitivity: 0.1,

@@ -45,7 +45,7 @@ mod tests {
         assert_eq!(of(0, &usual), PriorScale::default());
         let wide = aid::Settings {
             scale_prior: 0.01,
-            cross_prior: 0.012,
+            cross_prior: 0.0175,
             force_bias_prior: 0.2,
             ..usual
         };

@@ -3,6 +3,7 @@
 //! Apart from the nodes because these are the border of the equations: every node sees them.
 
 use super::settings::{PriorScale, PriorSigmas, Settings};
+use crate::mixture::share_of_variance;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.
@@ -160,7 +161,8 @@ impl Priors {
         let of =
             |priors: &Priors| DMatrix::from_fn(SENSOR, SENSOR, |i, j| priors.information[i][j]);
         let (narrow, covariance) = (of(self), of(&wide).try_inverse()?);
-        let more = (&narrow * covariance * &narrow - &narrow) * other.probability;
+        let more =
+            (&narrow * covariance * &narrow - &narrow) * share_of_variance(other.probability);
         let mut doubt = vec![[0.0; ALL]; ALL];
         for i in 0..SENSOR {
             for j in 0..SENSOR {

@@ -20,6 +20,8 @@ pub(super) fn plain() -> Settings {
         bias_drift: 0.0,
         force_carried: f64::INFINITY,
         colour: 0.0,
+        tilt_by_gravity: false,
+        force_turning: f64::INFINITY,
         rest_rate: 0.0349,
         rest_beside_bias: false,
         force_instant: 0.4,
@@ -245,6 +247,8 @@ fn the_golden_case_with_coloured_residuals_comes_out_to_all_its_digits() {
         let settings = Settings {
             rest_rate: 0.008_73,
             colour: 0.8,
+            tilt_by_gravity: false,
+            force_turning: f64::INFINITY,
             force_instant: 0.4,
             rest_lag: 0.0,
             bias_by_tilt: 0.0,

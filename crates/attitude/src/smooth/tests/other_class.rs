@@ -1,6 +1,7 @@
 //! A class that the sensor may be of instead: the same attitudes, as unsure as either class makes them.
 
 use super::logs::{Motion, log};
+use crate::mixture::share_of_variance;
 use crate::smooth::{Estimate, OtherClass, PriorScale, Settings};
 
 /// Variances of the tilt about east in the middle of a recording, with the other class and without, rad^2; the
@@ -28,7 +29,7 @@ fn what_lies_still_is_as_unsure_as_either_class_and_what_is_turned_is_not() {
     let more = (0.2_f64.powi(2) - 0.04_f64.powi(2)) / 9.81_f64.powi(2);
     for probability in [1.0, 0.5] {
         let [both, alone] = tilts(Motion::Still, probability);
-        let share = (both - alone) / more / probability;
+        let share = (both - alone) / more / share_of_variance(probability);
         assert!((0.9..1.0).contains(&share), "{both} {alone} {share}");
     }
     let [both, alone] = tilts(Motion::Hand, 1.0);
