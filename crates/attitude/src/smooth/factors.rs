@@ -12,6 +12,8 @@ use nalgebra::Vector3;
 
 /// Unknowns of a node: rotation (earth axes), velocity, position, gyro bias.
 pub(super) const STATES: usize = 12;
+/// The rotation about the vertical.
+pub(super) const HEADING: usize = 2;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const POSITION: usize = 6;
 pub(super) const BIAS: usize = 9;

@@ -6,15 +6,21 @@
 //! Position about its centre is a stationary process of Matern's covariance with `nu` 3/2, each axis by itself:
 //! `s^2 (1 + l t) exp(-l t)`, whose velocity has the variance `(l s)^2` (state and transition: Hartikainen, Sarkka
 //! 2010, section 3.1). Nodes that were each held to the centre by themselves would count one excursion many times.
+//!
+//! The process has no preferred direction, so what it says of a body that leans is stated in axes that turn with the
+//! heading: see `rows`.
 
 use super::border;
-use super::factors::{Node, POSITION, Row, STATES, VELOCITY};
+use super::factors::{HEADING, Node, POSITION, Row, STATES, VELOCITY};
 use super::segments::Segment;
 use super::settings::MotionModel;
 use nalgebra::Vector3;
 
 /// Ratio of the sigma to the root mean square.
 const WIDTH: f64 = 3.0;
+/// The same of a body that leans and never rests: a wider bound lets its positions wander, which widens the bound, until
+/// gravity says nothing of the attitude.
+const LEANING_WIDTH: f64 = 1.25;
 /// Never less, m/s and m.
 const LEAST: [f64; 2] = [0.05, 0.02];
 /// Beyond so many sigmas a node counts less (Cauchy's distribution).
@@ -36,6 +42,8 @@ pub(super) struct Bound {
     weights: Vec<[f64; 2]>,
     /// Pace of the process: `l` above, 1/s.
     pace: f64,
+    /// Whether no axis of the body stays upright, so that gravity tells the gyro's bias about all of them.
+    pub(super) is_leaning: bool,
 }
 
 /// Transition of the state of a node, position and velocity, to that of the next: `x' = A x + e`, `e` of variance `Q`.
@@ -73,6 +81,7 @@ impl Bound {
             sigma: [0.5, 1.0],
             weights: vec![[1.0; 2]; nodes],
             pace: BAND[0] * 0.5,
+            is_leaning: false,
         }
     }
 
@@ -121,6 +130,10 @@ impl Bound {
     }
 
     /// The rows of a segment that moves: velocity, and position less what it shares with that, by axis.
+    ///
+    /// Of a body that leans the residuals count in axes that turn with the heading of node `k`. Their squares are the
+    /// same, but a path that turns as a whole changes none of them, as it should: in fixed axes each residual, to first
+    /// order, grows by the angle times the one across, and the equations take that for knowledge of the heading.
     pub(super) fn rows<const W: usize>(
         &self,
         (k, segment): (usize, &Segment),
@@ -137,19 +150,31 @@ impl Bound {
         } = Transition::new(self.spread(), self.pace, segment.secs);
         let weight =
             0.25 * (self.weights[k].iter().sum::<f64>() + self.weights[k + 1].iter().sum::<f64>());
+        let (p, v) = (a.position - centre, a.velocity);
+        let speed = b.velocity - (p * by[1][0] + v * by[1][1]);
+        let place = b.position - centre - (p * by[0][0] + v * by[0][1]) - speed * shared;
+        let by_heading = |residual: &Vector3<f64>| match self.is_leaning {
+            true => residual.cross(&Vector3::z()),
+            false => Vector3::zeros(),
+        };
+        let (speed_turns, place_turns) = (by_heading(&speed), by_heading(&place));
         Some(std::array::from_fn(|at| {
             let i = at % 3;
-            let (p, v) = (a.position[i] - centre[i], a.velocity[i]);
-            let off = |what: usize| by[what][0] * p + by[what][1] * v;
-            let speed = b.velocity[i] - off(1);
-            let (residual, from, variance, next, second) = if at < 3 {
-                (speed, by[1], variance[0], VELOCITY + i, None)
+            let (residual, turns, from, variance, next, second) = if at < 3 {
+                (
+                    speed[i],
+                    speed_turns[i],
+                    by[1],
+                    variance[0],
+                    VELOCITY + i,
+                    None,
+                )
             } else {
-                let place = b.position[i] - centre[i] - off(0);
                 let from = [by[0][0] - shared * by[1][0], by[0][1] - shared * by[1][1]];
                 let second = Some((VELOCITY + i, -shared));
                 (
-                    place - shared * speed,
+                    place[i],
+                    place_turns[i],
                     from,
                     variance[1],
                     POSITION + i,
@@ -158,6 +183,7 @@ impl Bound {
             };
             let mut row = Row::new(residual, weight / variance, Some(next));
             row.second = second;
+            row.own[HEADING] = turns;
             row.own[POSITION + i] = -from[0];
             row.own[VELOCITY + i] = -from[1];
             let whole = if at < 3 { 0.0 } else { 1.0 };
@@ -181,6 +207,11 @@ impl Bound {
             let off = nodes[k].position - centre;
             [nodes[k].velocity.norm_squared(), off.norm_squared()]
         };
+        let rests = segments.iter().any(|segment| segment.is_still);
+        let width = match self.is_leaning && !rests {
+            true => LEANING_WIDTH,
+            false => WIDTH,
+        };
         if !moving.is_empty() {
             for what in 0..2 {
                 let (mut sum, mut weight) = (0.0, 0.0);
@@ -188,9 +219,8 @@ impl Bound {
                     sum += self.weights[*k][what] * squares(*k)[what];
                     weight += self.weights[*k][what];
                 }
-                self.sigma[what] = (WIDTH * (sum / weight / 3.0).sqrt()).max(LEAST[what]);
+                self.sigma[what] = (width * (sum / weight / 3.0).sqrt()).max(LEAST[what]);
             }
-            let rests = segments.iter().any(|segment| segment.is_still);
             let band = BAND[usize::from(!rests)];
             self.pace = (band * self.sigma[0] / self.sigma[1]).max(SLOWEST);
         }
@@ -220,8 +250,14 @@ impl Bound {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
-    use super::Transition;
+    use super::{Bound, Transition};
+    use crate::smooth::border::NARROW;
+    use crate::smooth::factors::{BIAS, HEADING, Node, POSITION, Row, STATES, VELOCITY};
+    use crate::smooth::segments::Segment;
+    use crate::smooth::settings::MotionModel;
+    use nalgebra::Vector3;
 
     #[test]
     fn a_stationary_process_stays_what_it_is() {
@@ -254,6 +290,57 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_path_that_turns_as_a_whole_says_nothing_of_the_heading() {
+        let node = |velocity: [f64; 3], position: [f64; 3]| Node {
+            q: [1.0, 0.0, 0.0, 0.0],
+            velocity: velocity.into(),
+            position: position.into(),
+            bias: Vector3::zeros(),
+        };
+        let nodes = [
+            node([0.3, -0.2, 0.1], [0.4, 0.1, -0.2]),
+            node([-0.1, 0.5, 0.2], [0.2, 0.6, 0.3]),
+        ];
+        let centre = Vector3::new(0.1, -0.3, 0.0);
+        let segment = Segment {
+            samples: 50,
+            secs: 0.5,
+            stamp: 0,
+            is_break: false,
+            is_still: false,
+            doubt: [0.0; 2],
+            mean_rate: Vector3::zeros(),
+            mean_force: Vector3::zeros(),
+            spread: [0.0; 2],
+            slow: 0.0,
+        };
+        for is_leaning in [true, false] {
+            let mut bound = Bound::new(MotionModel::Process, 2);
+            bound.is_leaning = is_leaning;
+            let rows = bound.rows::<NARROW>((0, &segment), [&nodes[0], &nodes[1]], &centre);
+            // Change of each row by a radian about the centre.
+            let turned = nodes.map(|node| {
+                let about = |x: Vector3<f64>| Vector3::z().cross(&x);
+                let (v, p) = (about(node.velocity), about(node.position - centre));
+                let mut turned = [0.0; STATES];
+                turned[HEADING] = 1.0;
+                turned[VELOCITY..POSITION].copy_from_slice(v.as_slice());
+                turned[POSITION..BIAS].copy_from_slice(p.as_slice());
+                turned
+            });
+            let change = |row: &Row<NARROW>| {
+                let own = row.own.iter().zip(&turned[0]).map(|(by, x)| by * x);
+                let next = row.next.map_or(0.0, |next| turned[1][next]);
+                let second = row.second.map_or(0.0, |(at, by)| by * turned[1][at]);
+                own.sum::<f64>() + next + second
+            };
+            let changes = rows.unwrap().map(|row| change(&row).abs());
+            let most = changes.into_iter().fold(0.0, f64::max);
+            assert_eq!(most < 1e-12, is_leaning, "{changes:?}");
         }
     }
 

@@ -12,19 +12,19 @@ use super::planar::Along;
 use super::sample::Samples;
 use super::segments::Segment;
 use super::settings::Settings;
-use super::solver::{Marginal, Solution, Solver};
+use super::solver::{Marginal, Solver};
 use super::survey::Survey;
 use super::sweep::GRAVITY;
-use crate::quaternion::kernel::{normalised, turned_in_navigation};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
+use step::{Step, largest_counted, tilted};
+
+mod step;
 
 /// A heading that nothing tells is held to this, rad.
 const HELD: f64 = 1e-4;
 /// Sigmas of the first node, rad, m/s, m: only so that there is a solution.
 const ANYWHERE: f64 = 1e6;
-/// Largest turn of a node in one iteration, rad.
-const LARGEST_TURN: f64 = 0.5;
 /// Done below this, rad, after so many iterations.
 const DONE: f64 = 1e-6_f64.to_radians();
 const FEWEST: usize = 4;
@@ -32,7 +32,11 @@ const FEWEST: usize = 4;
 const DIVERGING: f64 = 0.1;
 /// Times running: where the body rests somewhere, and where nothing holds its attitude.
 const GROWING: [usize; 2] = [3, 2];
-/// A result's last turn is below this, rad; while it is not, there are up to twice as many iterations.
+/// Most iterations without the field, in units of the setting; and of a body that leans and never rests, whose bound and
+/// heading settle together.
+const LONGEST: usize = 2;
+const LEANING_LONGEST: usize = 4;
+/// A result's last turn is below this, rad; while it is not, there are more iterations.
 const SETTLED: f64 = 0.1_f64.to_radians();
 /// And beside the sigma of its node.
 const SETTLED_SHARE: f64 = 0.3;
@@ -152,12 +156,28 @@ pub(super) fn run<S: Samples, const W: usize>(
         cost: f64::NAN,
     };
     let (mut largest, mut growing) = (f64::INFINITY, 0);
+    let mut before: Option<Step> = None;
+    let is_guarded = state.bound.is_leaning && !problem.rests();
     // With the field, weights change to the end: more of it is not better.
-    let longest = if W == WIDE { most } else { 2 * most };
+    let longest = match W == WIDE {
+        true => most,
+        false if state.bound.is_leaning && !problem.rests() => LEANING_LONGEST * most,
+        false => LONGEST * most,
+    };
     for iteration in 0..longest {
-        let before = phase.solver.take();
-        let equations = equations::<S, W>(samples, problem, state, before)?;
+        let reused = phase.solver.take();
+        let equations = equations::<S, W>(samples, problem, state, reused)?;
         phase.iterations += 1;
+        let too_long = before
+            .as_mut()
+            .filter(|step| iteration + 1 < longest && step.is_too_long(equations.cost));
+        if let Some(step) = too_long {
+            phase.solver = Some(equations.solver);
+            step.shorten(state);
+            let centre = border::vector(&state.constants, border::CENTRE);
+            state.bound.learn(&state.nodes, &centre, problem.segments);
+            continue;
+        }
         phase.fields = equations.fields;
         phase.cost = equations.cost;
         let tilt = off_vertical(problem.segments, &equations.pushes);
@@ -167,8 +187,10 @@ pub(super) fn run<S: Samples, const W: usize>(
             phase.failure = Some(Failure::NotFinite);
             return Ok(phase);
         };
-        let turns = state.correct(&solution);
+        let from = is_guarded.then(|| state.clone());
+        let turns = state.correct(&solution, 1.0);
         let turn = turns.iter().flatten().copied().fold(0.0, f64::max);
+        let counted = largest_counted(&turns, &state.bound);
         if W == WIDE {
             state.field_weights =
                 problem
@@ -177,18 +199,26 @@ pub(super) fn run<S: Samples, const W: usize>(
         }
         let centre = border::vector(&state.constants, border::CENTRE);
         state.bound.learn(&state.nodes, &centre, problem.segments);
-        growing = if turn > largest && turn > DIVERGING {
+        // A heading's steps are guarded by what they cost.
+        let guarded = if is_guarded { tilted(&turns) } else { counted };
+        growing = if guarded > largest && guarded > DIVERGING {
             growing + 1
         } else {
             0
         };
-        largest = turn;
-        phase.failure = problem.failure(state, turn, tilt);
+        largest = guarded;
+        phase.failure = problem.failure(state, counted, tilt);
         if growing >= GROWING[usize::from(!problem.rests())] {
-            phase.failure = Some(Failure::Diverging(turn));
+            phase.failure = Some(Failure::Diverging(counted));
             return Ok(phase);
         }
         phase.turns = turns;
+        before = from.map(|from| Step {
+            from,
+            solution,
+            share: 1.0,
+            cost: phase.cost,
+        });
         let is_done = turn < DONE && iteration + 1 >= FEWEST;
         if is_done || (turn < SETTLED && iteration + 1 >= most) {
             break;
@@ -231,31 +261,6 @@ impl Problem<'_> {
         } else {
             None
         }
-    }
-}
-
-impl State {
-    /// Takes the corrections; by how much each node was to turn, rad.
-    fn correct(&mut self, solution: &Solution) -> Vec<[f64; 3]> {
-        let turn = |x: &[f64; STATES]| std::array::from_fn(|axis| x[axis].abs());
-        let turns: Vec<[f64; 3]> = solution.nodes.iter().map(turn).collect();
-        let largest = turns.iter().flatten().copied().fold(0.0, f64::max);
-        let share = if largest < LARGEST_TURN {
-            1.0
-        } else {
-            LARGEST_TURN / largest
-        };
-        for (node, x) in self.nodes.iter_mut().zip(&solution.nodes) {
-            let part = |first: usize| Vector3::from_fn(|i, _| share * x[first + i]);
-            node.q = normalised(&turned_in_navigation(&part(0), &node.q));
-            node.velocity += part(VELOCITY);
-            node.position += part(POSITION);
-            node.bias += part(BIAS);
-        }
-        for (constant, x) in self.constants.iter_mut().zip(&solution.border) {
-            *constant += share * x;
-        }
-        turns
     }
 }
 

@@ -35,16 +35,8 @@ pub(super) fn run<S: Samples>(
     with: (&Survey, &Settings),
     segments: &[Segment],
 ) -> Result<Option<Realtime>, S::Error> {
-    let usual = aid::Settings::default();
-    // A sensor of a better class has less of a bias.
-    let share = with.1.bias_sigma / BIAS_SIGMA;
-    let class = usual.bias_prior * share;
-    let settings = aid::Settings {
-        bias_prior: class,
-        bias_class: class,
-        rest_by_direction: true,
-        ..usual
-    };
+    let settings = class_settings(with.1);
+    let (class, share) = (settings.bias_prior, class_share(with.1));
     if with.1.known.gyro_bias.iter().any(Option::is_some) {
         let known = with.1.bias_sigmas();
         let bias = Matrix3::from_diagonal(&known.component_mul(&known));
@@ -70,6 +62,37 @@ pub(super) fn run<S: Samples>(
             pass(samples, with, segments, (settings, sure))
         }
         None => Ok(None),
+    }
+}
+
+/// Runs it over all samples once, from a bias of which no more is known than what is beforehand.
+pub(super) fn run_by_class<S: Samples>(
+    samples: &mut S,
+    with: (&Survey, &Settings),
+    segments: &[Segment],
+) -> Result<Option<Realtime>, S::Error> {
+    pass(
+        samples,
+        with,
+        segments,
+        (class_settings(with.1), Vector3::zeros()),
+    )
+}
+
+/// Ratio of the bias of this sensor's class to the usual one: a better class has less of it.
+fn class_share(settings: &Settings) -> f64 {
+    settings.bias_sigma / BIAS_SIGMA
+}
+
+/// The filter's settings for a bias of the sensor's class.
+fn class_settings(settings: &Settings) -> aid::Settings {
+    let usual = aid::Settings::default();
+    let class = usual.bias_prior * class_share(settings);
+    aid::Settings {
+        bias_prior: class,
+        bias_class: class,
+        rest_by_direction: true,
+        ..usual
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod golden;
 mod input;
+mod leaning;
 mod logs;
 mod other_class;
 mod planar;

@@ -165,7 +165,7 @@ impl Work {
                 starts.push((bias, forward(samples, self.with(), &self.segments, &bias)?))
             }
             None => {
-                filter = realtime::run(samples, self.with(), &self.segments)?;
+                filter = self.filtered(samples)?;
                 for bias in self.biases(filter.as_ref()) {
                     let nodes = match &filter {
                         Some(filter) => filter.nodes.clone(),
@@ -184,9 +184,15 @@ impl Work {
                 .as_ref()
                 .and_then(|main| main.by_rests(&rests, &known, self.settings.bias_sigma));
             let along = held.map(|held| held.along());
-            let problem = problem(bias, along.or(upright.map(|main| main.free())));
+            // What the filter found in a motion has no weight of its own: the equations have that motion as well.
+            let beforehand = match still.is_none() && upright.is_none() {
+                true => Vector3::zeros(),
+                false => bias,
+            };
+            let problem = problem(beforehand, along.or(upright.map(|main| main.free())));
             let nodes: Vec<_> = nodes.into_iter().map(|q| (q, bias)).collect();
             let mut state = self.state(nodes, &trust);
+            state.bound.is_leaning = upright.is_none();
             let phase = run::<S, NARROW>(samples, &problem, &mut state, self.settings.iterations)?;
             let is_better = best.as_ref().is_none_or(|(_, _, other, _)| {
                 (phase.failure.is_none(), -phase.cost) > (other.failure.is_none(), -other.cost)
@@ -242,6 +248,18 @@ impl Work {
         }
     }
 
+    /// The real-time filter's view where nothing rests. A body that leans shows its bias to the filter that expects no
+    /// more than the class has; with a wide prior the heading may be off by turns.
+    fn filtered<S: Samples>(&self, samples: &mut S) -> Result<Option<Realtime>, S::Error> {
+        let filter = realtime::run(samples, self.with(), &self.segments)?;
+        let leans = |filter: &Realtime| Main::of(&self.segments, &filter.nodes).is_none();
+        if !filter.as_ref().is_some_and(leans) {
+            return Ok(filter);
+        }
+        let by_class = realtime::run_by_class(samples, self.with(), &self.segments)?;
+        Ok(by_class.filter(leans).or(filter))
+    }
+
     /// Prior of the gyro's bias where nothing rests.
     fn biases(&self, filter: Option<&Realtime>) -> Vec<Vector3<f64>> {
         let inner = self.segments.iter().filter(|segment| !segment.is_break);
@@ -293,6 +311,8 @@ impl Work {
             &mut state.constants,
         );
         state.has_north = has_north;
+        // Now the field tells the heading.
+        state.bound.is_leaning = false;
         if !state.has_north.contains(&true) || self.settings.field_iterations == 0 {
             let mut solved = Solved::of(state, &plain, iterations, doubt.as_deref());
             if let (Ok(solved), Some(held)) = (&mut solved, held) {
