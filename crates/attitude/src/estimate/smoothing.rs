@@ -102,6 +102,14 @@ fn is_beyond(smoothed: &Smoothed, looseness: PriorScale) -> bool {
     is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&force)
 }
 
+/// Whether something beside gravity holds the attitudes: a rest, a bias about an upright axis that was held, or a north.
+/// Without any, priors that are too narrow make motion of what is wrong with the sensor.
+fn is_held(smoothed: &Smoothed) -> bool {
+    smoothed.counts().standstills > 0
+        || smoothed.held().is_some()
+        || smoothed.sections().iter().any(|section| section.has_north)
+}
+
 /// Removes what the scales of all axes share, which is known of no accelerometer: each is then known to `own`.
 fn own_scales(mut force: Estimated<9>, own: f64) -> Estimated<9> {
     const SCALES: [usize; 3] = [0, 4, 8];
@@ -354,8 +362,14 @@ impl Smoothing {
         let mut smoothed = self.smooth_by(&settings, iron)?;
         if smoothed.is_err() && self.told.is_class_found {
             // Priors that lead nowhere are none to prefer.
-            settings.looseness = PriorScale::default();
-            smoothed = self.smooth_by(&settings, iron)?;
+            let usual = Settings {
+                looseness: PriorScale::default(),
+                ..settings
+            };
+            let again = self.smooth_by(&usual, iron)?;
+            if again.as_ref().is_ok_and(is_held) {
+                (settings, smoothed) = (usual, again);
+            }
         }
         let smoothed = match smoothed {
             Ok(smoothed) => smoothed,
