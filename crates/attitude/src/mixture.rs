@@ -2,7 +2,7 @@
 //!
 //! Apart from the filter and the smoother because both doubt the class of a sensor. A variance alone is too small: with
 //! one class in ten four times as wide, the variance of the mixture is 2.5 times that of the narrow one, and one
-//! error in 30, not one in 370, is beyond three of its sigmas.
+//! error in 42, not one in 370, is beyond three of its sigmas.
 
 /// Share of a Gaussian beyond three sigmas, on either side.
 const BEYOND_THREE: f64 = 1.35e-3;

@@ -80,7 +80,7 @@ impl Filter {
                 + by_velocity * self.state.velocity[i]
                 + by_position * self.state.position[i]
         });
-        // Of a body that leans as far as gravity is believed by half, nothing is withheld for that.
+        // Nothing on a body that leans so far that gravity is believed by half.
         let upright = (2.0 * self.state.vertical.withheld().1 - 1.0).max(0.0);
         let turn = (self.turned_about_vertical(), upright);
         let mut variance =

@@ -30,11 +30,11 @@ pub struct NoisePreset {
 ///
 /// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088: offset 1 deg/s, sensitivity 1 %, cross-axis 1 %, accelerometer
 /// offset 20 mg; `uncalibrated`, a cheap chip on a board that nobody has measured: InvenSense MPU-6050, scale 3 %,
-/// cross-axis 2 %, offset 50 mg, and 1 degree to its case; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %,
-/// misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h, 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm,
-/// 10 arc seconds, 25 ug). Sensitivities to acceleration: BMI088 and MPU-6050 0.1 deg/s per g, an Xsens MTi 0.006,
-/// ADIS16465 0.009, STIM300 1 deg/h per g. Delays: of a chip's default filters; the better the class, the better it is
-/// stated and taken out.
+/// cross-axis 2 %, offset 50 mg, and 1 degree to its case, which is most of the misalignment; ADIS16465: repeatability
+/// 0.14 deg/s, sensitivity 0.25 %, misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h, 500 ppm, 1 mrad, 0.75 mg; HG9900
+/// class: 0.003 deg/h, 5 ppm, 10 arc seconds, 25 ug). Sensitivities to acceleration: BMI088 and MPU-6050 0.1 deg/s per
+/// g, an Xsens MTi 0.006, ADIS16465 0.009, STIM300 1 deg/h per g. Delays: of a chip's default filters; the better the
+/// class, the better it is stated and taken out.
 pub const NOISE_PRESETS: [NoisePreset; 5] = [
     NoisePreset {
         name: "consumer",
