@@ -126,7 +126,7 @@ fn what_it_learned_is_saved_and_serves_the_filter() {
     )
     .done();
     let (before, after) = (error(dir, "before.mcap"), error(dir, "after.mcap"));
-    // Of the tilt: it is two to three times smaller for each of six seeds. What the heading has drifted by without a rest is
+    // Of the tilt: it is a third to two thirds for each of six seeds. What the heading has drifted by without a rest is
     // chance, and larger with a calibration for three of them.
     assert!(
         after[2] < 0.7 * before[2],

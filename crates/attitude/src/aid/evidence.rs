@@ -7,7 +7,7 @@
 use super::covariance::SCALE;
 use super::filter::{COLOURED, Filter, WIDE};
 use super::other_class::{ClassDoubt, NUMBERS, OtherClass};
-use crate::mixture::share_of_variance;
+use crate::open_class::share_of_variance;
 use nalgebra::{Cholesky, Const, Matrix3, SMatrix, SVector};
 
 /// Corrections after which the class is weighed again: 10 s.

@@ -134,8 +134,8 @@ impl Filter {
     /// Angle that the body has turned about the vertical in this interval, rad.
     fn turned_about_vertical(&self) -> f64 {
         let sums = &self.state.interval;
-        let up = sums.attitude.row(2).transpose() / sums.secs;
-        up.dot(&(sums.rate - self.state.calibration.bias * sums.secs))
+        sums.up()
+            .dot(&(sums.rate - self.state.calibration.bias * sums.secs))
     }
 
     fn reference_is_left(&self) -> bool {

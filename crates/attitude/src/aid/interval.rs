@@ -100,6 +100,11 @@ impl Interval {
         self.secs += secs;
     }
 
+    /// Mean of the vertical, body axes.
+    pub(super) fn up(&self) -> Vector3<f64> {
+        self.attitude.row(2).transpose() / self.secs
+    }
+
     /// Sum of the squares of what scale and cross axes do: how much was turned.
     pub(super) fn turned_squared(&self) -> f64 {
         self.scaled.iter().flatten().map(|s| s * s).sum()

@@ -160,7 +160,7 @@ impl Filter {
         self.state
             .covariance
             .add_to_attitude(settings.gyro_noise.powi(2) * secs + turned);
-        let up = self.state.interval.attitude.row(2).transpose() / secs;
+        let up = self.state.interval.up();
         let tilted = self
             .state
             .last_up

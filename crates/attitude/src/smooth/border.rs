@@ -3,7 +3,7 @@
 //! Apart from the nodes because these are the border of the equations: every node sees them.
 
 use super::settings::{PriorScale, PriorSigmas, Settings};
-use crate::mixture::share_of_variance;
+use crate::open_class::share_of_variance;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.

@@ -306,18 +306,7 @@ mod tests {
             node([-0.1, 0.5, 0.2], [0.2, 0.6, 0.3]),
         ];
         let centre = Vector3::new(0.1, -0.3, 0.0);
-        let segment = Segment {
-            samples: 50,
-            secs: 0.5,
-            stamp: 0,
-            is_break: false,
-            is_still: false,
-            doubt: [0.0; 2],
-            mean_rate: Vector3::zeros(),
-            mean_force: Vector3::zeros(),
-            spread: [0.0; 2],
-            slow: 0.0,
-        };
+        let segment = Segment::moving();
         for is_leaning in [true, false] {
             let mut bound = Bound::new(MotionModel::Process, 2);
             bound.is_leaning = is_leaning;

@@ -42,6 +42,25 @@ pub(super) struct Segment {
     pub slow: f64,
 }
 
+#[cfg(test)]
+impl Segment {
+    /// Half a second of motion, whatever was measured in it.
+    pub(super) fn moving() -> Segment {
+        Segment {
+            samples: 50,
+            secs: 0.5,
+            stamp: 0,
+            is_break: false,
+            is_still: false,
+            doubt: [0.0; 2],
+            mean_rate: Vector3::zeros(),
+            mean_force: Vector3::zeros(),
+            spread: [0.0; 2],
+            slow: 0.0,
+        }
+    }
+}
+
 /// Mean and sum of squares about it.
 #[derive(Clone, Copy)]
 struct Moments {

@@ -2,7 +2,7 @@
 
 use super::golden::{Run, sample};
 use crate::aid::{OtherClass, Settings};
-use crate::mixture::share_of_variance;
+use crate::open_class::share_of_variance;
 use nalgebra::{Matrix3, Vector3};
 
 const OTHER: OtherClass = OtherClass {

@@ -1,7 +1,7 @@
 //! A class that the sensor may be of instead: the same attitudes, as unsure as either class makes them.
 
 use super::logs::{Motion, log};
-use crate::mixture::share_of_variance;
+use crate::open_class::share_of_variance;
 use crate::smooth::{Estimate, OtherClass, PriorScale, Settings};
 
 /// Variances of the tilt about east in the middle of a recording, with the other class and without, rad^2; the

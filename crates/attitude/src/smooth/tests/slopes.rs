@@ -46,18 +46,7 @@ fn place() -> Place {
     // What an offset in time makes of bias and matrix is left out: a millisecond of what they are.
     constants[border::FORCE_TIME] = 0.0;
     constants[border::FIELD_TIME] = 0.0;
-    let segment = Segment {
-        samples: 50,
-        secs: 0.5,
-        stamp: 0,
-        is_break: false,
-        is_still: false,
-        doubt: [0.0; 2],
-        mean_rate: Vector3::zeros(),
-        mean_force: Vector3::zeros(),
-        spread: [0.0; 2],
-        slow: 0.0,
-    };
+    let segment = Segment::moving();
     let mut place = Place {
         samples: prepared[3001..=3050].to_vec(),
         nodes: [node(3000), node(3050)],
