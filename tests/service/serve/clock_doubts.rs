@@ -150,8 +150,9 @@ fn batches_are_known_from_the_first_sample_after_a_restart() {
     let mut process = started(&path);
     let mut sender = Client::tcp(process.address(0));
     sender.send_bytes(batches(0..1000, batched).as_bytes());
-    eventually("the batches in the file", || {
-        std::fs::read_to_string(&path).is_ok_and(|text| text.contains("\"batches\":["))
+    eventually("the batches in the file, and all that was sent", || {
+        std::fs::read_to_string(&path)
+            .is_ok_and(|text| text.contains("\"batches\":[") && text.contains("\"index\":1000,"))
     });
     process.child.kill().unwrap();
     process.child.wait().unwrap();
