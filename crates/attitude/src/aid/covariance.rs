@@ -129,6 +129,12 @@ impl Covariance {
         self.rows[a][b]
     }
 
+    /// Variance of a sum of states, each times its factor.
+    pub(super) fn variance_of_sum(&self, h: &[(usize, f64)]) -> f64 {
+        let with = |a: usize| -> f64 { h.iter().map(|(b, by)| by * self.rows[a][*b]).sum() };
+        h.iter().map(|(a, by)| by * with(*a)).sum()
+    }
+
     /// Sets the covariance of two states, at the start.
     pub(super) fn set(&mut self, a: usize, b: usize, covariance: f64) {
         self.rows[a][b] = covariance;

@@ -80,13 +80,39 @@ impl Filter {
                 + by_velocity * self.state.velocity[i]
                 + by_position * self.state.position[i]
         });
-        // Nothing on a body that leans so far that gravity is believed by half.
-        let upright = (2.0 * self.state.vertical.withheld().1 - 1.0).max(0.0);
-        let turn = (self.turned_about_vertical(), upright);
-        let mut variance =
-            self.state
-                .residuals
-                .variance(secs, residual, &force.acceleration, turn, &settings);
+        let turn = (self.turned_about_vertical(), self.state.vertical.upright());
+        let gravity = settings.gravity;
+        let up = if settings.tilt_by_gravity {
+            gravity
+        } else {
+            force.up
+        };
+        let rows = [0, 1].map(|i| {
+            let [x, y, z, lead] = force.by_calibration[i];
+            // A tilt about y makes gravity seem to point along x, one about x against y.
+            let (tilt, by_tilt) = [(TILT + 1, up), (TILT, -up)][i];
+            [
+                (tilt, by_tilt),
+                (FORCE_BIAS, x),
+                (FORCE_BIAS + 1, y),
+                (FORCE_BIAS + 2, z),
+                (LEAD, lead),
+                (VELOCITY + i, by_velocity),
+                (POSITION + i, by_position),
+            ]
+        });
+        // What stays upright drives in curves, or sways with a swell: there a wrong tilt explains too much.
+        let leans = 1.0 - self.state.vertical.known_upright();
+        let share = settings.force_explained * leans * leans;
+        let explained = rows.map(|h| share * self.state.covariance.variance_of_sum(&h));
+        let mut variance = self.state.residuals.variance(
+            secs,
+            residual,
+            explained,
+            &force.acceleration,
+            turn,
+            &settings,
+        );
         if self.rests() {
             let (ax, ay) = (force.acceleration.x, force.acceleration.y);
             let square = ax * ax + ay * ay;
@@ -101,27 +127,9 @@ impl Filter {
                 variance = floor + 0.01;
             }
         }
-        let gravity = settings.gravity;
-        let up = if settings.tilt_by_gravity {
-            gravity
-        } else {
-            force.up
-        };
         for i in 0..2 {
-            let [x, y, z, lead] = force.by_calibration[i];
-            // A tilt about y makes gravity seem to point along x, one about x against y.
-            let (tilt, by_tilt) = [(TILT + 1, up), (TILT, -up)][i];
-            let h = [
-                (tilt, by_tilt),
-                (FORCE_BIAS, x),
-                (FORCE_BIAS + 1, y),
-                (FORCE_BIAS + 2, z),
-                (LEAD, lead),
-                (VELOCITY + i, by_velocity),
-                (POSITION + i, by_position),
-            ];
             let (left, sigma) = self.state.covariance.measure_withholding(
-                &h,
+                &rows[i],
                 -residual[i],
                 variance,
                 self.state.vertical.withheld(),

@@ -10,9 +10,12 @@
 use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 
-/// First and last time at which it is judged, s.
+/// First time at which it is judged, s; that at which no gravity is near; the last one, after which a swell has passed.
 const FIRST: f64 = 1.0;
-const LAST: f64 = 4.0;
+const FAR: f64 = 4.0;
+const LAST: f64 = 20.0;
+/// Lengths of a mean force, as shares of gravity, beyond which no gravity is near.
+const NEAR: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 /// Largest deviation of the mean from gravity, as a share: errors of sensors.
 const SHARE: f64 = 0.15;
 /// Change of velocity that bodies are capable of meanwhile, m/s.
@@ -56,10 +59,12 @@ impl Plausibility {
         };
         let (sum, seen) = (sum + force * secs, before + secs);
         *self = Plausibility::Seen(sum, seen);
-        let is_time = (before < FIRST && seen >= FIRST) || seen >= LAST;
-        if is_time && is_gravity(sum.norm() / seen, seen, gravity) {
+        let is_time = (before < FIRST && seen >= FIRST) || seen >= FAR;
+        let length = sum.norm() / seen;
+        let is_near = NEAR.contains(&(length / gravity));
+        if is_time && is_gravity(length, seen, gravity) {
             *self = Plausibility::Given;
-        } else if seen >= LAST {
+        } else if seen >= LAST || (seen >= FAR && !is_near) {
             *self = Plausibility::Denied;
         }
         *self == Plausibility::Denied
@@ -78,7 +83,7 @@ mod tests {
 
     fn judged(force: impl Fn(f64) -> f64) -> Plausibility {
         let mut plausibility = Plausibility::default();
-        for i in 0..1000 {
+        for i in 0..2500 {
             let up = Vector3::z() * force(f64::from(i) * 0.01);
             let _ = plausibility.denies(0.01, &up, G);
         }
@@ -96,6 +101,14 @@ mod tests {
             judged(|secs| if secs < 1.5 { 1.2 * G } else { G }),
             Plausibility::Given
         );
+    }
+
+    #[test]
+    fn a_boat_that_begins_on_a_long_wave_has_gravity_once_it_has_passed() {
+        let wave = |secs: f64| 3.5 * (std::f64::consts::TAU * secs / 9.0).sin();
+        assert_eq!(judged(|secs| G + wave(secs)), Plausibility::Given);
+        assert_eq!(judged(|secs| G - wave(secs)), Plausibility::Given);
+        assert_eq!(judged(|secs| 1.4 * G + wave(secs)), Plausibility::Denied);
     }
 
     #[test]

@@ -49,7 +49,8 @@ impl Residuals {
     }
 
     /// Variance of the residual of an interval of `secs`, in which the body has turned by `turned` rad about the vertical
-    /// and the acceleration (earth axes) is; `upright` says how far one axis of the body stays vertical, 0 to 1.
+    /// and the acceleration (earth axes) is; `upright` says how far one axis of the body stays vertical, 0 to 1. By
+    /// `explained` its square is more than that of noise: what the filter does not know yet makes it, too.
     ///
     /// A wrong tilt carries the velocity and the position of the reference off without bound, and the residual with
     /// them: were that taken for noise, gravity would be believed less and less. So a residual counts in proportion to
@@ -58,11 +59,14 @@ impl Residuals {
         &mut self,
         secs: f64,
         residual: [f64; 2],
+        explained: [f64; 2],
         acceleration: &Vector3<f64>,
         (turned, upright): (f64, f64),
         settings: &Settings,
     ) -> f64 {
         let share = secs / (settings.force_secs + secs);
+        let of_noise = self.share_of_noise(secs, &residual, &explained, settings);
+        let residual = residual.map(|one| one * of_noise);
         let across = acceleration.xy().norm_squared();
         self.acceleration += share * (across - self.acceleration);
         let most = settings.force_carried * self.acceleration.max(across);
@@ -94,6 +98,28 @@ impl Residuals {
         let density = density + upright * turning;
         let colour = ((1.0 + likeness) / (1.0 - likeness)).powf(settings.colour);
         density / secs * colour
+    }
+
+    /// Root of the share of a residual's square that is of noise, by its expectation under the density so far.
+    fn share_of_noise(
+        &self,
+        secs: f64,
+        residual: &[f64; 2],
+        explained: &[f64; 2],
+        settings: &Settings,
+    ) -> f64 {
+        let noise = self.density.max(settings.force_floor) / secs;
+        let (mut all, mut of_noise) = (0.0, 0.0);
+        for (residual, explained) in residual.iter().zip(explained) {
+            let share = noise / (noise + explained);
+            all += residual * residual;
+            of_noise += (share * residual).powi(2) + noise * (1.0 - share);
+        }
+        if of_noise < all {
+            (of_noise / all).sqrt()
+        } else {
+            1.0
+        }
     }
 
     /// Power density of what turns about the vertical with the body, beyond `chance`.
@@ -131,7 +157,14 @@ mod tests {
             let gait = if k % 2 == 0 { 5.0 } else { -5.0 };
             let residual = [gait + pull * cos, pull * sin];
             let acceleration = Vector3::new(residual[0], residual[1], 0.0);
-            variance = residuals.variance(0.1, residual, &acceleration, (turned, 1.0), settings);
+            variance = residuals.variance(
+                0.1,
+                residual,
+                [0.0; 2],
+                &acceleration,
+                (turned, 1.0),
+                settings,
+            );
         }
         variance
     }
@@ -150,5 +183,40 @@ mod tests {
         for nothing in [more(2.0, 0.0), more(0.0, 0.04), more(0.2, 0.04)] {
             assert_eq!(nothing, 1.0);
         }
+    }
+
+    /// Variance after ten seconds of noise and two of residuals of 5 m/s^2 of which `explained` is made by a wrong tilt.
+    fn after_a_wrong_tilt(explained: f64) -> f64 {
+        let settings = Settings::default();
+        let mut residuals = Residuals::new(&settings);
+        let mut variance = 0.0;
+        for k in 0..120 {
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let size = if k < 100 { 0.5 } else { 5.0 };
+            let acceleration = Vector3::new(1.0, 0.0, 0.0);
+            let residual = [size * sign, 0.0];
+            variance = residuals.variance(
+                0.1,
+                residual,
+                [explained; 2],
+                &acceleration,
+                (0.0, 0.0),
+                &settings,
+            );
+        }
+        variance
+    }
+
+    #[test]
+    fn what_the_filter_does_not_know_yet_is_no_noise() {
+        let all = after_a_wrong_tilt(0.0);
+        assert!(after_a_wrong_tilt(0.01) > 0.8 * all);
+        assert!(
+            after_a_wrong_tilt(5.0) < 0.2 * all,
+            "{} {all}",
+            after_a_wrong_tilt(5.0)
+        );
+        // It never adds to the noise.
+        assert!(after_a_wrong_tilt(1e9) < 0.2 * all);
     }
 }

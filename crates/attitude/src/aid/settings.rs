@@ -69,6 +69,8 @@ pub struct Settings {
     /// Discount of residuals that resemble the ones before them; 0: none, 1: as for a
     /// process of first order.
     pub colour: f64,
+    /// Share, of the variance that a residual has by what the filter does not know yet, that is not taken for noise.
+    pub force_explained: f64,
     /// Whether a tilt is looked for by gravity alone, not by the vertical acceleration with it: a body that moves along a
     /// slant, as a runner does at each step, accelerates up and aside at once and is not tilted.
     pub tilt_by_gravity: bool,
@@ -168,6 +170,7 @@ impl Default for Settings {
             force_vertical: 0.1,
             force_carried: 30.0,
             colour: 1.1,
+            force_explained: 0.03,
             tilt_by_gravity: true,
             force_turning: 2.0,
             update_secs: 0.1,

@@ -69,6 +69,16 @@ impl Vertical {
         (&self.main, self.withheld)
     }
 
+    /// Share of the body that stays upright, 0 to 1: nothing of one that leans so far that gravity is believed by half.
+    pub(super) fn upright(&self) -> f64 {
+        (2.0 * self.withheld - 1.0).max(0.0)
+    }
+
+    /// The same, as far as the body has been seen for long enough to know.
+    pub(super) fn known_upright(&self) -> f64 {
+        self.upright() * self.secs / MEMORY_SECS
+    }
+
     /// Whether it can have come about.
     pub(super) fn is_plausible(&self) -> bool {
         let is_share = |x: f64| (-1e-9..=1.0 + 1e-9).contains(&x);
