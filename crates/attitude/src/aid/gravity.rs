@@ -104,7 +104,8 @@ impl Filter {
         // What stays upright drives in curves, or sways with a swell: there a wrong tilt explains too much.
         let leans = 1.0 - self.state.vertical.known_upright();
         let share = settings.force_explained * leans * leans;
-        let explained = rows.map(|h| share * self.state.covariance.variance_of_sum(&h));
+        let of_axis = rows.map(|h| self.state.covariance.variance_of_sum(&h));
+        let explained = share * 0.5 * (of_axis[0] + of_axis[1]);
         let mut variance = self.state.residuals.variance(
             secs,
             residual,

@@ -59,13 +59,13 @@ impl Residuals {
         &mut self,
         secs: f64,
         residual: [f64; 2],
-        explained: [f64; 2],
+        explained: f64,
         acceleration: &Vector3<f64>,
         (turned, upright): (f64, f64),
         settings: &Settings,
     ) -> f64 {
         let share = secs / (settings.force_secs + secs);
-        let of_noise = self.share_of_noise(secs, &residual, &explained, settings);
+        let of_noise = self.share_of_noise(secs, &residual, explained, settings);
         let residual = residual.map(|one| one * of_noise);
         let across = acceleration.xy().norm_squared();
         self.acceleration += share * (across - self.acceleration);
@@ -100,21 +100,19 @@ impl Residuals {
         density / secs * colour
     }
 
-    /// Root of the share of a residual's square that is of noise, by its expectation under the density so far.
+    /// Root of the share of a residual's square that is of noise, by its expectation under the density so far. Of both axes
+    /// together, so that it is the same whatever the heading.
     fn share_of_noise(
         &self,
         secs: f64,
         residual: &[f64; 2],
-        explained: &[f64; 2],
+        explained: f64,
         settings: &Settings,
     ) -> f64 {
         let noise = self.density.max(settings.force_floor) / secs;
-        let (mut all, mut of_noise) = (0.0, 0.0);
-        for (residual, explained) in residual.iter().zip(explained) {
-            let share = noise / (noise + explained);
-            all += residual * residual;
-            of_noise += (share * residual).powi(2) + noise * (1.0 - share);
-        }
+        let share = noise / (noise + explained);
+        let all = residual[0] * residual[0] + residual[1] * residual[1];
+        let of_noise = share * share * all + 2.0 * noise * (1.0 - share);
         if of_noise < all {
             (of_noise / all).sqrt()
         } else {
@@ -157,14 +155,8 @@ mod tests {
             let gait = if k % 2 == 0 { 5.0 } else { -5.0 };
             let residual = [gait + pull * cos, pull * sin];
             let acceleration = Vector3::new(residual[0], residual[1], 0.0);
-            variance = residuals.variance(
-                0.1,
-                residual,
-                [0.0; 2],
-                &acceleration,
-                (turned, 1.0),
-                settings,
-            );
+            variance =
+                residuals.variance(0.1, residual, 0.0, &acceleration, (turned, 1.0), settings);
         }
         variance
     }
@@ -198,7 +190,7 @@ mod tests {
             variance = residuals.variance(
                 0.1,
                 residual,
-                [explained; 2],
+                explained,
                 &acceleration,
                 (0.0, 0.0),
                 &settings,

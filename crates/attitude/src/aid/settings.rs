@@ -170,7 +170,7 @@ impl Default for Settings {
             force_vertical: 0.1,
             force_carried: 30.0,
             colour: 1.1,
-            force_explained: 0.03,
+            force_explained: 0.02,
             tilt_by_gravity: true,
             force_turning: 2.0,
             update_secs: 0.1,
