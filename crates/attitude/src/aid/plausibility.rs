@@ -10,9 +10,11 @@
 use crate::plausible::{are_numbers, is_amount};
 use nalgebra::Vector3;
 
-/// First time at which it is judged, s; that at which no gravity is near; the last one, after which a swell has passed.
+/// First time at which it is judged, s.
 const FIRST: f64 = 1.0;
+/// Time from which a mean that is nowhere near gravity is denied, s.
 const FAR: f64 = 4.0;
+/// Time from which any other is, s: a swell has passed.
 const LAST: f64 = 20.0;
 /// Lengths of a mean force, as shares of gravity, beyond which no gravity is near.
 const NEAR: std::ops::RangeInclusive<f64> = 0.5..=2.0;

@@ -50,7 +50,7 @@ impl Residuals {
 
     /// Variance of the residual of an interval of `secs`, in which the body has turned by `turned` rad about the vertical
     /// and the acceleration (earth axes) is; `upright` says how far one axis of the body stays vertical, 0 to 1. By
-    /// `explained` its square is more than that of noise: what the filter does not know yet makes it, too.
+    /// `explained` (m^2/s^4, each axis) its square is more than that of noise: what the filter does not know makes it, too.
     ///
     /// A wrong tilt carries the velocity and the position of the reference off without bound, and the residual with
     /// them: were that taken for noise, gravity would be believed less and less. So a residual counts in proportion to
@@ -100,7 +100,7 @@ impl Residuals {
         density / secs * colour
     }
 
-    /// Root of the share of a residual's square that is of noise, by its expectation under the density so far. Of both axes
+    /// Root of the share of a residual's square that is of noise, at most 1, by its expectation under the density so far. Of both axes
     /// together, so that it is the same whatever the heading.
     fn share_of_noise(
         &self,

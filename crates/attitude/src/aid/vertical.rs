@@ -69,7 +69,7 @@ impl Vertical {
         (&self.main, self.withheld)
     }
 
-    /// Share of the body that stays upright, 0 to 1: nothing of one that leans so far that gravity is believed by half.
+    /// Degree to which one axis stays vertical, 0 to 1; 0 where the body leans so far that gravity is believed by half.
     pub(super) fn upright(&self) -> f64 {
         (2.0 * self.withheld - 1.0).max(0.0)
     }
