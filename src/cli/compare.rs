@@ -16,7 +16,7 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use strapd_attitude::compare::{
-    Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Reference, Stamped,
+    Align, BiasFit, BodyAxesFit, Comparison, Consistency, ErrorStats, Errors, Reference, Stamped,
     UncertainAttitude, compare, consistency, fit_body_axes, fit_constant_bias, for_each_error,
 };
 use strapd_attitude::diagnostic::Diagnostic;
@@ -165,6 +165,8 @@ struct ErrorExplanation {
     sigma: Option<Consistency>,
     /// The constant bias that explains them.
     bias: Option<BiasFit>,
+    /// The body axes that do.
+    axes: Option<BodyAxesFit>,
 }
 
 /// Errors over a second that other axes explain to this share are no bias.
@@ -196,6 +198,7 @@ impl ErrorExplanation {
         ErrorExplanation {
             sigma: consistency(&known, referred, align, |_| {}),
             bias: fit_constant_bias(estimated, referred).filter(is_bias),
+            axes: axes.filter(BodyAxesFit::are_others),
         }
     }
 
@@ -206,6 +209,17 @@ impl ErrorExplanation {
             if let Some(beyond) = against::beyond_sigma(found) {
                 let _ = writeln!(out, "  verdict  {beyond}");
             }
+        }
+        if let Some(fit) = &self.axes {
+            let [w, x, y, z] = fit.turn.wxyz();
+            let _ = writeln!(
+                out,
+                "  axes     the reference is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from the estimate's: {} deg over 1 s, {} with the turn; \
+                 compare does not turn them: strapd replay LOG with --base-frame NAME or --mount q=W,X,Y,Z, and --against-recorded",
+                fit.angle().to_degrees(),
+                significant(fit.as_recorded.to_degrees(), 3),
+                significant(fit.turned.to_degrees(), 3),
+            );
         }
         if let Some(fit) = &self.bias {
             let _ = writeln!(
@@ -374,6 +388,15 @@ fn as_json(
             "bias_left".to_owned(),
             told.bias.as_ref().map(against::bias_json).into(),
         );
+        let axes = |fit: &BodyAxesFit| {
+            serde_json::json!({
+                "turn_wxyz": fit.turn.wxyz(),
+                "angle_deg": fit.angle().to_degrees(),
+                "as_recorded_deg": fit.as_recorded.to_degrees(),
+                "turned_deg": fit.turned.to_degrees(),
+            })
+        };
+        object.insert("other_axes".to_owned(), told.axes.as_ref().map(axes).into());
     }
     value
 }

@@ -384,6 +384,23 @@ fn a_force_in_the_rows_of_the_rates_is_not_looked_for_elsewhere() {
 }
 
 #[test]
+fn an_acceleration_without_gravity_levels_nothing_and_that_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    phone(at).write(&at.join("phone"));
+    std::fs::remove_file(at.join("phone/TotalAcceleration.csv")).unwrap();
+    let ran = strapd(at, "replay phone -o out.csv --aid auto -v");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(
+        ran.err.contains("Accelerometer.csv is without gravity")
+            && ran.err.contains("Total Acceleration"),
+        "{}",
+        ran.err
+    );
+    assert!(ran.out.contains("aid      none"), "{}", ran.out);
+}
+
+#[test]
 fn a_bad_row_beside_is_counted_and_named_with_its_file() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();

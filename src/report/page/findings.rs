@@ -4,7 +4,9 @@ use super::markup::{escaped, sentence};
 use crate::report::findings::{Finding, Severity, findings};
 use serde_json::Value;
 use std::fmt::Write as _;
+use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::estimate::{Bias, EstimationSettings};
+use strapd_attitude::setting::GYRO_UNIT;
 use strapd_replay::inspection::Checked;
 
 /// Most findings written out; the worst come first.
@@ -24,7 +26,7 @@ impl FindingRow {
     #[must_use]
     pub fn all(checked: &Checked, plan: &EstimationSettings) -> Vec<FindingRow> {
         let row = |finding: Finding| FindingRow {
-            answered: answered(finding.code, plan),
+            answered: answered(&finding, plan),
             finding,
         };
         findings(checked).into_iter().map(row).collect()
@@ -48,11 +50,16 @@ impl FindingRow {
 }
 
 /// The flag of this run that deals with a finding about the samples as recorded.
-fn answered(code: &str, plan: &EstimationSettings) -> Option<&'static str> {
-    let (is_given, flag) = match code {
-        "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
+fn answered(finding: &Finding, plan: &EstimationSettings) -> Option<&'static str> {
+    // A unit that was given is no answer to a finding that it is another.
+    let mut advised = finding.help.iter().flatten();
+    let unit = advised.find(|choice| choice.setting == GYRO_UNIT);
+    let is_another = |given: GyroUnit| unit.is_some_and(|unit| unit.value != given.name());
+    let has_unit = plan.unit.is_some_and(|given| !is_another(given));
+    let (is_given, flag) = match finding.code {
+        "unit-degrees" => (has_unit, "--gyro-unit"),
         "unit-unknown" => (plan.gyro_scale != [1.0; 3], "--gyro-scale"),
-        "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
+        "unit-against-gravity" if has_unit => (true, "--gyro-unit"),
         "looks-frd" if plan.is_accel_kinematic => (true, "--accel-sign"),
         "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),
         "mounted-on-side" => (plan.mount.is_some(), "--mount"),

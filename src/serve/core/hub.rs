@@ -503,9 +503,10 @@ impl Hub {
         for line in sensor.stream.doubted(plan) {
             log_throttle::warn(&format!("doubt {id} {line}"), &format!("{id}: {line}"));
         }
-        for fault in faults.iter().filter(|f| f.code == Fault::STAMP_UNIT) {
+        let of_clock = [Fault::STAMP_UNIT, Fault::STILL_STAMPS];
+        for fault in faults.iter().filter(|f| of_clock.contains(&f.code)) {
             log_throttle::warn(
-                &format!("stamp unit {id}"),
+                &format!("{} {id}", fault.code),
                 &format!("{id}: {}", fault.message),
             );
         }

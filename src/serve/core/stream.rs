@@ -18,6 +18,7 @@ pub(in crate::serve::core) mod resetting;
 pub mod run;
 mod stamp_unit;
 pub mod stamps;
+mod still_stamps;
 
 use crate::pipeline::session_builder::labelled;
 use crate::report::calibration;
@@ -40,6 +41,7 @@ use stamp_unit::StampUnit;
 use stamps::{Stamps, TimedSamples};
 use std::collections::VecDeque;
 use std::sync::Arc;
+use still_stamps::StillStamps;
 use strapd_attitude::aid::{OutsideHeading, OutsideHeadingCounts};
 use strapd_attitude::condition::{Report, StampRepair};
 use strapd_attitude::diagnostic::Diagnostic;
@@ -84,6 +86,8 @@ pub struct SensorStream {
     intervals: Intervals,
     /// Check of the unit of its stamps.
     stamp_unit: StampUnit,
+    /// Check that its stamps go on.
+    still_stamps: StillStamps,
     /// Findings about its samples; `None` of one of so many that they are not watched.
     doubts: Option<Box<Doubts>>,
     /// Reset that was asked of it.
@@ -205,6 +209,7 @@ impl SensorStream {
             why_no_stamp: None,
             intervals: Intervals::default(),
             stamp_unit: StampUnit::default(),
+            still_stamps: StillStamps::default(),
             resetting: Resetting::default(),
             saved,
             first: None,
@@ -358,6 +363,7 @@ impl SensorStream {
                 let kind = self.estimator.sample_kind().kind;
                 self.intervals.take(raw, plan.clock, kind);
                 self.stamp_unit.take(raw, plan.clock);
+                self.still_stamps.take(raw, plan.clock);
             }
         }
         self.first = self.first.or(self.conditioning().first);
@@ -440,6 +446,7 @@ impl SensorStream {
         let mut news = Vec::from_iter(self.ambiguous.take());
         news.extend(self.intervals.news(&self.id));
         news.extend(self.stamp_unit.news(&self.id));
+        news.extend(self.still_stamps.news(&self.id));
         if std::mem::take(&mut self.has_unused_forces) && self.told & FORCES == 0 {
             self.told |= FORCES;
             news.push(Fault {

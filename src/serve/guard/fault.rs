@@ -40,6 +40,8 @@ pub struct Fault {
 impl Fault {
     /// Stamps are in another unit than their name says.
     pub(in crate::serve) const STAMP_UNIT: &'static str = "stamp_unit";
+    /// Stamps do not go on.
+    pub(in crate::serve) const STILL_STAMPS: &'static str = "still_stamps";
 
     /// Makes one without a place.
     #[must_use]

@@ -155,6 +155,28 @@ fn the_same_is_said_of_an_attitude_in_a_file_of_any_format() {
 }
 
 #[test]
+fn an_attitude_of_other_body_axes_is_said_to_be_one_by_compare() {
+    let dir = tempfile::tempdir().unwrap();
+    written(dir.path(), "log.mcap", &moved(1, |_, _| ()));
+    for (mount, angle) in [("", None), ("--mount rpy=0,0,40", Some(40.0))] {
+        let replay = format!("replay log.mcap -o a.mcap --force --quiet {mount}");
+        strapd(dir.path(), &replay).done();
+        let said = strapd(dir.path(), "compare a.mcap log.mcap --json").json();
+        let found = said["other_axes"]["angle_deg"].as_f64();
+        let off = found.zip(angle).map(|(found, angle)| found - angle);
+        assert_eq!(found.is_some(), angle.is_some(), "{said}");
+        assert!(off.is_none_or(|off: f64| off.abs() < 1.0), "{said}");
+        let ran = strapd(dir.path(), "compare a.mcap log.mcap");
+        let text = &ran.done().out;
+        assert_eq!(
+            text.contains("--base-frame NAME"),
+            angle.is_some(),
+            "{text}"
+        );
+    }
+}
+
+#[test]
 fn a_summary_says_what_its_sigma_is_made_of() {
     let dir = tempfile::tempdir().unwrap();
     written(dir.path(), "log.mcap", &moved(1, |_, _| ()));

@@ -22,6 +22,10 @@ const ENOUGH: usize = 20_000;
 /// The second singular value must be this share of the first: motion about one axis leaves the turn
 /// about it open.
 const EXCITED: f64 = 0.02;
+/// Errors over 1 s below this need no explanation, rad (2 degrees).
+const SMALL: f64 = 0.035;
+/// Other axes explain an error when they leave less than this share of it.
+const EXPLAINED: f64 = 0.4;
 
 /// Axes of a recorded orientation relative to those of the estimate.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -40,6 +44,26 @@ pub struct BodyAxesFit {
     pub turned: f64,
     /// Whether all this is for the recorded quaternion's inverse, which fits better.
     pub inverse: bool,
+}
+
+impl BodyAxesFit {
+    /// Whether the two agree as they are recorded, or so nearly that nothing is to be explained.
+    #[must_use]
+    pub fn agrees(&self) -> bool {
+        self.as_recorded < SMALL
+    }
+
+    /// Whether the recorded orientation is that of other body axes.
+    #[must_use]
+    pub fn are_others(&self) -> bool {
+        !self.agrees() && !self.inverse && self.turned < EXPLAINED * self.as_recorded
+    }
+
+    /// Angle between the axes, rad.
+    #[must_use]
+    pub fn angle(&self) -> f64 {
+        2.0 * self.turn.wxyz()[0].abs().min(1.0).acos()
+    }
 }
 
 /// The best turn of the body axes, of the recorded orientation or of its inverse; `None` when too few

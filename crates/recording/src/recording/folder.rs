@@ -10,6 +10,7 @@ use crate::decode::{Options, Wanted};
 use crate::delimited::Table;
 use crate::error::{Error, Result};
 use crate::format::{Format, open};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::JOIN;
@@ -166,6 +167,14 @@ impl Tables {
                 self.forces = vec![self.forces.swap_remove(at)];
             }
         }
+        let is_without_gravity = |file: &PathBuf| stem(file) == "accelerometer";
+        if self.forces.iter().any(is_without_gravity) && is_of_sensor_logger(main) {
+            self.forces.retain(|file| !is_without_gravity(file));
+            warn.say(&format!(
+                "{}: Sensor Logger's Accelerometer.csv is without gravity and is not used: record Total Acceleration or Accelerometer (Uncalibrated) beside the gyroscope",
+                main.display(),
+            ));
+        }
         // What the rates have in their own rows is not looked for elsewhere.
         let own = table(main, Wanted::Rates);
         if own.as_ref().is_some_and(Table::has_force) {
@@ -224,6 +233,16 @@ fn split_by_rosbag2(path: &Path, files: &[(PathBuf, Format)]) -> Option<Format> 
     let is_of_ros = matches!(format, Format::Mcap | Format::Rosbag2);
     let is_alike = files.iter().all(|(_, other)| other == format);
     (is_of_ros && is_alike && path.join("metadata.yaml").is_file()).then_some(*format)
+}
+
+/// Whether a table is one of Sensor Logger's, by its first line.
+fn is_of_sensor_logger(file: &Path) -> bool {
+    let mut first = [0; 64];
+    let read = open(file)
+        .ok()
+        .and_then(|mut opened| opened.read(&mut first).ok());
+    let first = first.get(..read.unwrap_or_default()).unwrap_or_default();
+    first.starts_with(b"time,seconds_elapsed,")
 }
 
 /// Table that a file is read as, with what is wanted in it.

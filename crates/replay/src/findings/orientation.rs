@@ -15,7 +15,7 @@ use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_K
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
-/// Other axes explain an error when they leave less than this share of it.
+/// A bias explains an error when it leaves less than this share of it.
 const EXPLAINED: f64 = 0.4;
 /// Errors over 1 s below this need no explanation, rad (2 degrees).
 const SMALL: f64 = 0.035;
@@ -307,7 +307,7 @@ fn is_truth(recorded: &Recorded, is_seen: bool, out: &mut Vec<Finding>) -> bool 
 }
 
 fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
-    if fit.as_recorded < SMALL {
+    if fit.agrees() {
         return true;
     }
     let [w, x, y, z] = fit.turn.wxyz();
@@ -335,14 +335,14 @@ fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
         ));
         return false;
     }
-    if fit.turned < EXPLAINED * fit.as_recorded {
+    if fit.are_others() {
         out.push(evidence(
             Finding::new(
                 Severity::Warning,
                 "orientation-other-axes",
                 format!(
                     "the recorded orientation is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from the gyro's: {} deg over 1 s as recorded, {} deg with the turn",
-                    deg(2.0 * w.abs().min(1.0).acos()),
+                    deg(fit.angle()),
                     significant(deg(fit.as_recorded), 3),
                     significant(deg(fit.turned), 3)
                 ),

@@ -264,14 +264,20 @@ fn of_scale(
         .with("factor", factor)
         .with("sigma", factor * sigma)
     };
-    if !is_known {
-        return finding("").advise("give the gyro's unit, or its scale");
-    }
-    let near = near(
+    let mut near = near(
         (found, consistency),
         (AxisMap::IDENTITY, factor, sigma),
         (plan, unit),
     );
+    if !is_known {
+        // An order of size tells units apart, and no ranges.
+        near.retain(|named| named.cure.setting == GYRO_UNIT);
+        let finding = |words: &str| finding(words).advise("give the gyro's unit, or its scale");
+        return match near.pop() {
+            Some(named) => finding(&format!(": {}", named.words)).help([named.cure]),
+            None => finding(""),
+        };
+    }
     if near.is_empty() {
         let scaled = scaled(plan, factor);
         return finding("")

@@ -24,6 +24,7 @@ impl SensorStream {
         let (report, clock) = (self.conditioning(), self.prepared.clock.name());
         let mut found = of_sensor(report, &self.estimator.propagation(), clock);
         found.extend(self.stamp_unit.finding());
+        found.extend(self.still_stamps.finding());
         let mut found: Vec<_> = found.iter().map(Finding::json).collect();
         found.extend(self.doubts.iter().flat_map(|doubts| doubts.findings()));
         found.sort_by_key(rank);

@@ -36,6 +36,7 @@ impl SensorStream {
         self.counted = self.conditioning().counts;
         self.intervals.reopen();
         self.stamp_unit.meet();
+        self.still_stamps.meet();
         self.arrivals = None;
     }
 
@@ -166,6 +167,7 @@ impl SensorStream {
         self.joining = Joining::Joined;
         self.intervals.begin();
         self.stamp_unit.begin();
+        self.still_stamps.begin();
         self.runs += 1;
         let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
         let seen = match before.first {

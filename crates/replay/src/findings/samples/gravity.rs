@@ -5,6 +5,7 @@ use crate::inspection::Inspection;
 use crate::summary::significant;
 use nalgebra::{Vector3, Vector4};
 use serde_json::json;
+use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::condition::quality::GravityAxis;
 use strapd_attitude::consistency::CHIPS;
 use strapd_attitude::frames::BodyAxes;
@@ -42,7 +43,9 @@ fn another_factor(looked: &Inspection) -> Option<Option<Fitting>> {
     let found = looked.quality.gyro_against_gravity?;
     let is_near = |factor: f64| (1.0 / UNIT_FACTOR..=UNIT_FACTOR).contains(&factor);
     let is_seen = found.correlation.abs() > MIN_CORRELATION;
-    if !is_seen || is_near(found.factor) {
+    // The rates are those of the unit that the format states, or as recorded where the plan states one.
+    let (taken, is_as_recorded) = (looked.resolved.unit, looked.quality_unit != GyroUnit::Rad);
+    if !is_seen || (is_near(found.factor) && !is_as_recorded) {
         return None;
     }
     let degree = 1_f64.to_radians();
@@ -53,14 +56,19 @@ fn another_factor(looked: &Inspection) -> Option<Option<Fitting>> {
         .into_iter()
         .min_by(|a, b| off(a).total_cmp(&off(b)))
         .filter(|chip| {
-            found.correlation >= COUNTS_CORRELATION && off(chip) <= COUNTS_WITHIN && !is_mrad(chip)
+            let is_certain = found.correlation >= COUNTS_CORRELATION && off(chip) <= COUNTS_WITHIN;
+            is_certain && (is_as_recorded || taken == GyroUnit::Rad) && !is_mrad(chip)
         })
         .map(|(counts, range)| Fitting::Counts(counts, range));
-    let units = [("deg", degree), ("mrad", 1e-3)];
-    let unit = units
-        .iter()
-        .find(|(_, unit)| is_near(found.factor / unit))
-        .map(|(name, _)| Fitting::Unit(name));
+    let read = match is_as_recorded {
+        true => 1.0,
+        false => taken.to_rad(),
+    };
+    let unit = [GyroUnit::Deg, GyroUnit::Mrad, GyroUnit::Rad]
+        .into_iter()
+        .filter(|unit| is_as_recorded || *unit != taken)
+        .find(|unit| is_near(found.factor * read / unit.to_rad()))
+        .map(|unit| Fitting::Unit(unit.name()));
     Some(
         match is_fast(looked) && unit != Some(Fitting::Unit("deg")) {
             true => nearest.or(unit),
@@ -114,7 +122,10 @@ pub(super) fn turns_otherwise(seen: &Seen<'_>, out: &mut Vec<Finding>) {
         None => finding
             .advise("give the gyro's axes or unit as they are")
             .help([BODY.to("MAP")])
-            .help([GYRO_UNIT.to("deg")]),
+            .help([GYRO_UNIT.to(match seen.looked.resolved.unit {
+                GyroUnit::Deg => "rad",
+                _ => "deg",
+            })]),
     });
 }
 

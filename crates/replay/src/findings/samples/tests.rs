@@ -257,7 +257,7 @@ fn a_finding_is_a_row_of_the_table() {
 #[test]
 fn gravity_tells_the_unit_of_the_rates_and_where_they_disagree() {
     // One radian a second about x, and what the gyro says of it.
-    let advice = |gyro: f64| {
+    let read = |gyro: f64| {
         let at = |n: i64| {
             let angle = n as f64 * 0.005;
             RawSample {
@@ -266,9 +266,11 @@ fn gravity_tells_the_unit_of_the_rates_and_where_they_disagree() {
                 ..sample(n)
             }
         };
-        let found = of_samples(&looked(&(0..2000).map(at).collect::<Vec<_>>()));
-        one(&found, "unit-against-gravity").map(Finding::flags)
+        looked(&(0..2000).map(at).collect::<Vec<_>>())
     };
+    let flags =
+        |looked: &Inspection| one(&of_samples(looked), "unit-against-gravity").map(Finding::flags);
+    let advice = |gyro: f64| flags(&read(gyro));
     assert_eq!(advice(1.0), None);
     assert_eq!(advice(1_f64.to_degrees()), Some("gyro_unit deg".to_owned()));
     assert_eq!(advice(1000.0), Some("gyro_unit mrad".to_owned()));
@@ -282,6 +284,16 @@ fn gravity_tells_the_unit_of_the_rates_and_where_they_disagree() {
         let read = 1.03 * counts * 1_f64.to_degrees();
         assert_eq!(advice(read), Some(format!("gyro_scale {factor}")));
     }
+    // A unit that was stated and is another: by the format, or in a stream; and by who replays.
+    let stated = |gyro: f64, judged_in| {
+        let mut looked = read(gyro);
+        (looked.resolved.unit, looked.quality_unit) = (GyroUnit::Deg, judged_in);
+        flags(&looked)
+    };
+    let rad = Some("gyro_unit rad".to_owned());
+    assert_eq!(stated(1_f64.to_radians(), GyroUnit::Rad), rad);
+    assert_eq!(stated(1.0, GyroUnit::Deg), rad);
+    assert_eq!(stated(1.0, GyroUnit::Rad), None);
     let between = advice(100.0 * 1_f64.to_degrees());
     assert_eq!(between, Some("body MAP, or gyro_unit deg".to_owned()));
 }

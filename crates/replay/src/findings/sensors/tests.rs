@@ -238,6 +238,14 @@ fn the_scale_of_the_gyro_is_named_and_what_is_advised_cures_it() {
         );
         assert_eq!(found(&bad, &[cure]), []);
     }
+    // Rad/s that are taken for deg/s, in motions that tell the factor and that tell its order of size.
+    for moved in [&clean, &lasting(32, (2.5, 3.0))] {
+        let all = found(moved, &[GYRO_UNIT.to("deg")]);
+        let cause = all.iter().find(|finding| finding.code == SCALE);
+        let cause = cause.unwrap_or_else(|| panic!("{all:?}"));
+        assert!(cause.what.contains("they look like rad/s"), "{cause:?}");
+        assert_eq!(cause.help[0], [GYRO_UNIT.to("rad")], "{cause:?}");
+    }
     let bad = by_gyro(&clean, &Matrix3::from_diagonal_element(0.6));
     let all = found(&bad, &[]);
     let [finding] = all.as_slice() else {

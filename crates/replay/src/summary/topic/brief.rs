@@ -30,10 +30,18 @@ fn cut_before_advice(finding: &Finding) -> String {
     let line = finding.line();
     let advice = line.strip_prefix(&finding.what).unwrap_or_default();
     let (long, advised) = (line.chars().count(), advice.chars().count());
-    if long <= LONGEST || advised == 0 || advised > LONGEST / 2 {
+    if long <= LONGEST || advised == 0 {
         return cut(&line);
     }
-    format!("{}{advice}", cut_to(&finding.what, LONGEST - advised))
+    // Of advice that is itself too long, the settings.
+    let flags = finding.flags();
+    let kept = match advised > LONGEST / 2 {
+        true if flags.is_empty() => return cut(&line),
+        true => format!(": {flags}"),
+        false => advice.to_owned(),
+    };
+    let left = LONGEST.saturating_sub(kept.chars().count());
+    format!("{}{kept}", cut_to(&finding.what, left.max(LONGEST / 2)))
 }
 
 impl TopicSummary {
@@ -127,6 +135,7 @@ impl TopicSummary {
 mod tests {
     use super::*;
     use strapd_attitude::record::Verdict;
+    use strapd_attitude::setting::GYRO_UNIT;
 
     #[test]
     fn the_worst_warning_is_shown_and_the_others_are_counted() {
@@ -157,6 +166,14 @@ mod tests {
             "{said}"
         );
         assert!(said.len() < LONGEST + 30);
+        // Of a long advice the settings are left.
+        topic.findings = vec![
+            Finding::new(Severity::Warning, "code", "what it is ".repeat(5))
+                .advise("why it helps ".repeat(20))
+                .help([GYRO_UNIT.to("deg")]),
+        ];
+        let said = topic.brief(&[]).pop().unwrap_or_default().1;
+        assert!(said.ends_with("what it is : gyro_unit deg"), "{said}");
         let whole = topic.rows(false).len();
         assert!(whole > lines.len());
     }
