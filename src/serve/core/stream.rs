@@ -282,6 +282,7 @@ impl SensorStream {
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
     /// are. Those whose stamps are bare numbers wait for the unit of all.
     pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<TimedSamples> {
+        self.stamp_unit.state(run.head.stamp_unit);
         let bare = run.bare.iter().flatten().next();
         let is_stamped = bare.is_some() || run.samples.iter().any(|raw| raw.header.is_some());
         if run.by_arrival && !is_stamped {

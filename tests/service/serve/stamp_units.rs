@@ -2,14 +2,19 @@
 //! goes on.
 
 use super::client::Client;
-use super::daemon::{Daemon, eventually};
+use super::daemon::{Daemon, TCP, eventually, listening};
 use serde_json::Value;
 
 /// Samples with these stamps.
 fn lines(stamps: impl Iterator<Item = i64>) -> String {
+    lines_in("ns", stamps)
+}
+
+/// The same with stamps of this unit by their name.
+fn lines_in(unit: &str, stamps: impl Iterator<Item = i64>) -> String {
     let line = |(n, stamp): (usize, i64)| {
         format!(
-            "{{\"id\":\"imu0\",\"stamp_ns\":{stamp},\"gyro\":[0.001,0,0.0{:02}]}}\n",
+            "{{\"id\":\"imu0\",\"stamp_{unit}\":{stamp},\"gyro\":[0.001,0,0.0{:02}]}}\n",
             n % 100
         )
     };
@@ -59,6 +64,48 @@ fn another_unit_is_said_once_with_the_one_that_fits_and_is_in_status() {
         assert_eq!(found.len(), 1, "{unit}: {found:?}");
         assert_eq!(found[0]["severity"], "error");
         assert_eq!(found[0]["evidence"]["unit"], unit);
+    }
+}
+
+#[test]
+fn the_unit_that_is_said_is_the_one_that_the_name_or_the_columns_state() {
+    let table = |stamps: fn(i64) -> i64| {
+        let row = |n| format!("{},0.001,0,0.0{:02}\n", stamps(n), n % 100);
+        "t,gx,gy,gz\n".to_owned() + &(0..600).map(row).collect::<String>()
+    };
+    let columns = "?columns=stamp=t:us,gyro=gx:gy:gz:rad/s&id=imu0";
+    for (parameters, sent, stated, step, unit) in [
+        (
+            "",
+            lines_in("us", (0..600).map(|n| 11 + 10 * n)),
+            "us",
+            10,
+            "ms",
+        ),
+        (
+            "",
+            lines_in("us", (0..600).map(|n| MS / 1000 + n)),
+            "us",
+            1,
+            "s",
+        ),
+        (columns, table(|n| 11 + 10 * n), "us", 10, "ms"),
+    ] {
+        let daemon = Daemon::start(listening(&[&format!("{TCP}{parameters}")]));
+        let said = codes_said(&daemon, &sent);
+        assert_eq!(said.len(), 1, "{stated} {unit}: {said:?}");
+        let message = said[0]["message"].as_str().unwrap();
+        for words in [
+            format!("in {stated} by their name or a setting, but steps of {step} {stated} "),
+            format!("those of a gyro only in {unit}; send them as stamp_{unit}"),
+            format!("--field stamp=stamp_{stated}:{unit}"),
+        ] {
+            assert!(message.contains(&words), "{words}: {message}");
+        }
+        let evidence = &findings(&daemon)[0]["evidence"];
+        assert_eq!(evidence["stated"], stated);
+        assert_eq!(evidence["unit"], unit);
+        assert_eq!(evidence["step_ns"], f64::from(step) * 1000.0);
     }
 }
 

@@ -6,7 +6,7 @@
 use super::time_of_day::Daily;
 use crate::columns::DAY;
 use crate::decode::{OUR_TIME, decimal_in_steps, instant_of_date};
-use strapd_attitude::record::Nanos;
+use strapd_attitude::record::{Nanos, TimeUnit};
 
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;
@@ -79,6 +79,17 @@ impl Clock {
         Clock::Days {
             origin: origin_of(first).unwrap_or(0),
         }
+    }
+
+    /// The unit of its numbers, where that is one that can be named.
+    pub(super) fn unit(&self) -> Option<TimeUnit> {
+        let size = match self {
+            Clock::Nanos => 1.0,
+            Clock::Counts { nanos, .. } => *nanos,
+            _ => return None,
+        };
+        let mut named = TimeUnit::NAMED.iter().map(|(_, unit)| *unit);
+        named.find(|unit| unit.nanos(0.0) as f64 == size)
     }
 
     /// The instant that a cell says; `number` has its point where it belongs.

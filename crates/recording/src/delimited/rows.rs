@@ -466,6 +466,7 @@ impl Table {
                 _ => gyro.map(|_| crate::decode::GyroUnit::Rad),
             },
             accel_unit: self.declared.accel_unit,
+            stamp_unit: self.clock.unit(),
             ..Line::default()
         };
         line.decoded.samples = 1;

@@ -16,6 +16,8 @@ pub(super) struct BareStamps {
     waiting: Vec<(RawSample, Option<Bare>)>,
     /// Steps of the stamps that state their unit.
     stated: StatedNanos,
+    /// The unit that they state.
+    stated_unit: Option<TimeUnit>,
     /// Steps of the recorder's clock, of rows that carry it beside their stamp.
     arrivals: StatedNanos,
 }
@@ -31,6 +33,7 @@ impl BareStamps {
         line: &Line,
     ) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
         let bare = line.bare.iter().copied().chain(std::iter::repeat(None));
+        self.stated_unit = line.stamp_unit.or(self.stated_unit);
         for (raw, bare) in samples.drain(..).zip(bare) {
             if let (Some(stamp), None, false) = (raw.header, bare, raw.is_beside) {
                 self.stated.take(stamp);
@@ -57,11 +60,11 @@ impl BareStamps {
         self.release(true)
     }
 
-    /// Returns the fault of stamps that are in nanoseconds by their name, if there is one. Where the recorder's clock
+    /// Returns the fault of stamps whose name states their unit, if there is one. Where the recorder's clock
     /// ticks as a gyro does, no unit is guessed: its speed tells what the stamps are, and takes their place.
     pub(super) fn too_fast(&self) -> Option<TooFast> {
         self.stated
-            .too_fast()
+            .too_fast(self.stated_unit)
             .filter(|_| !self.arrivals.are_a_sensors())
     }
 

@@ -63,7 +63,7 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     }
 }
 
-/// Returns whether stamps that are nanoseconds by their name are held against their steps. Tables of other makers were,
+/// Returns whether stamps that state their unit are held against their steps. Tables of other makers were,
 /// by their first rows; a unit that the user states is believed.
 pub(super) fn are_judged(lines: &Lines<impl Read>, options: &Options) -> bool {
     let is_stated = options.are_stamps_unread || options.states_stamp_unit();

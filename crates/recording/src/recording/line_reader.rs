@@ -56,8 +56,8 @@ impl Sensors {
         (!is_one_more).then_some(next)
     }
 
-    /// Refuses stamps whose name says nanoseconds and whose steps say another unit.
-    pub(super) fn check_nanos(&self, path: &Path, format: Format) -> Result<(), Error> {
+    /// Refuses stamps whose steps are those of a gyro only in another unit than their name says.
+    pub(super) fn check_stated(&self, path: &Path, format: Format) -> Result<(), Error> {
         match self.bare.iter().find_map(BareStamps::too_fast) {
             Some(found) => Err(Error::unsupported(path, found.in_file(format.is_table()))),
             None => Ok(()),

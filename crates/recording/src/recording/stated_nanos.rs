@@ -1,4 +1,4 @@
-//! Stamps that are nanoseconds by their name -> whether their steps are those of a gyro. Pure.
+//! Stamps that state their unit, in nanoseconds -> whether their steps are those of a gyro. Pure.
 //!
 //! Apart from `bare_stamps` because nothing waits: such stamps are believed until all of them are known.
 //! A table of another maker is judged by its first rows; here the whole counts, as a sensor may begin with a burst.
@@ -25,14 +25,16 @@ pub struct StatedNanos {
     short: u64,
     /// Sum of the steps, none of them above [`PAUSE`], ns.
     sum: i64,
-    first: Vec<Bare>,
+    first: Vec<i64>,
 }
 
-/// Steps that no gyro has, in nanoseconds.
+/// Steps that no gyro has in the unit that their stamps state.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TooFast {
-    /// The ordinary step, ns.
+    /// The ordinary step, in the unit that they state.
     pub step: f64,
+    /// Unit that they state; `None`: no name states it, and they are nanoseconds.
+    pub stated: Option<TimeUnit>,
     /// The units in which it is that of a gyro.
     pub fits: Vec<TimeUnit>,
 }
@@ -52,7 +54,7 @@ impl StatedNanos {
         self.short += u64::from(step < SHORTEST_STEP);
         self.sum = self.sum.saturating_add(step.min(PAUSE));
         if self.first.len() < FIRST && step < SHORTEST_STEP {
-            self.first.push(Bare::whole(step));
+            self.first.push(step);
         }
     }
 
@@ -73,17 +75,19 @@ impl StatedNanos {
     }
 
     /// Returns the steps if most are shorter than any gyro's, other than in bursts, and would be a gyro's in another
-    /// unit.
+    /// unit than the stamps state.
     #[must_use]
-    pub fn too_fast(&self) -> Option<TooFast> {
+    pub fn too_fast(&self, stated: Option<TimeUnit>) -> Option<TooFast> {
         let is_ordinary = self.steps >= FEWEST && 2 * self.short > self.steps;
         if !is_ordinary || self.mean() >= SHORTEST_STEP {
             return None;
         }
-        let (step, mut fits) = units_of_steps(self.first.iter().copied())?;
+        let unit = stated.unwrap_or(TimeUnit::Nano);
+        let counted = |nanos: i64| Bare::of(nanos, unit);
+        let (step, mut fits) = units_of_steps(self.first.iter().copied().map(counted))?;
         // In that unit the stamp itself must be an instant.
-        let last = Bare::whole(self.last?.0);
-        fits.retain(|unit| *unit != TimeUnit::Nano && last.is_instant_in(*unit));
+        let last = counted(self.last?.0);
+        fits.retain(|other| *other != unit && last.is_instant_in(*other));
         if let Some(ours) = fits
             .iter()
             .copied()
@@ -91,7 +95,7 @@ impl StatedNanos {
         {
             fits = vec![ours];
         }
-        (!fits.is_empty()).then_some(TooFast { step, fits })
+        (!fits.is_empty()).then_some(TooFast { step, stated, fits })
     }
 }
 
@@ -100,11 +104,28 @@ impl TooFast {
     #[must_use]
     pub fn what(&self) -> String {
         let names: Vec<&str> = self.fits.iter().map(|unit| unit.name()).collect();
+        let unit = self.stated_unit();
+        let read = match self.stated {
+            Some(_) => format!("in {unit} by their name or a setting"),
+            None => format!("read in {unit}"),
+        };
         format!(
-            "its stamps are in ns by their name, but steps of {} ns are those of a gyro only in {}",
+            "its stamps are {read}, but steps of {} {unit} are those of a gyro only in {}",
             self.step,
             names.join(" or ")
         )
+    }
+
+    /// The name of the unit in which the stamps are read.
+    #[must_use]
+    pub fn stated_unit(&self) -> &'static str {
+        self.stated.unwrap_or(TimeUnit::Nano).name()
+    }
+
+    /// The ordinary step as it is read, ns.
+    #[must_use]
+    pub fn step_nanos(&self) -> f64 {
+        self.step * self.stated.unwrap_or(TimeUnit::Nano).nanos(0.0) as f64
     }
 
     /// The name of the unit that fits, the shortest of several.
@@ -115,28 +136,29 @@ impl TooFast {
 
     /// The error for rows or lines of a file, with the setting that states the unit.
     pub(super) fn in_file(&self, is_table: bool) -> Diagnostic {
-        let unit = self.unit();
-        let help = match is_table {
-            true => {
-                format!("{COLUMNS} stamp=stamp_ns:{unit} takes them so, and :ns as their name says")
-            }
-            false => {
-                format!("{FIELD} stamp=stamp_ns:{unit} takes them so, and :ns as their name says")
-            }
-        };
+        let (unit, stated) = (self.unit(), self.stated_unit());
+        let setting = if is_table { COLUMNS } else { FIELD };
+        let help = format!(
+            "{setting} stamp=stamp_{stated}:{unit} takes them so, and :{stated} as their name says"
+        );
         Diagnostic::new(self.what()).help(help)
     }
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
     fn judged(stamps: impl Iterator<Item = i64>) -> Option<(f64, Vec<&'static str>)> {
+        let found = judged_in(None, stamps)?;
+        Some((found.step, found.fits.iter().map(|u| u.name()).collect()))
+    }
+
+    fn judged_in(stated: Option<TimeUnit>, stamps: impl Iterator<Item = i64>) -> Option<TooFast> {
         let mut steps = StatedNanos::default();
         stamps.for_each(|stamp| steps.take(Nanos(stamp)));
-        let found = steps.too_fast()?;
-        Some((found.step, found.fits.iter().map(|u| u.name()).collect()))
+        steps.too_fast(stated)
     }
 
     const MS: i64 = 1_700_000_000_000;
@@ -177,5 +199,40 @@ mod tests {
         // Of our time in nanoseconds they are in no other unit, however near.
         assert_eq!(judged((0..2000).map(|i| MS * 1_000_000 + 10_000 * i)), None);
         assert_eq!(judged((0..8).map(|i| MS + 10 * i)), None, "too few");
+    }
+
+    #[test]
+    fn the_unit_that_the_name_states_is_the_one_that_is_said() {
+        // What is sent, in which unit by its name, and what it is.
+        for (stated, count, step, unit) in [
+            (TimeUnit::Micro, 11, 10, "ms"),
+            (TimeUnit::Micro, MS, 10, "ms"),
+            (TimeUnit::Micro, 1_700_000_000, 1, "s"),
+            (TimeUnit::Nano, MS * 1000, 10_000, "us"),
+        ] {
+            let size = stated.nanos(0.0);
+            let stamps = (0..200).map(|i| (count + step * i) * size);
+            let found = judged_in(Some(stated), stamps).unwrap();
+            let name = stated.name();
+            assert_eq!((found.stated_unit(), found.unit()), (name, unit));
+            let said = format!(
+                "in {name} by their name or a setting, but steps of {step} {name} are those of a gyro only in {unit}"
+            );
+            assert!(found.what().contains(&said), "{}", found.what());
+            let help = found.in_file(false).to_string();
+            let setting = format!("stamp=stamp_{name}:{unit} takes them so, and :{name} as");
+            assert!(help.contains(&setting), "{help}");
+        }
+        // Hundredths of a second called ms: 0.01 ms is short, and 0.01 s a gyro's.
+        let stamps = (0..200).map(|i| 1_700_000_000_000_000 + 10_000 * i);
+        let found = judged_in(Some(TimeUnit::Milli), stamps).unwrap();
+        assert_eq!((found.step, found.unit()), (0.01, "s"));
+        assert!(
+            judged_in(None, (0..200).map(|i| 10 * i)).is_some_and(|found| {
+                found
+                    .what()
+                    .starts_with("its stamps are read in ns, but steps of 10 ns")
+            })
+        );
     }
 }

@@ -67,7 +67,7 @@ impl TextLog {
         };
         let sensors = read(&mut lines, input.name(), take)?;
         if are_judged(&lines, options) {
-            sensors.check_nanos(input.name(), lines.format())?;
+            sensors.check_stated(input.name(), lines.format())?;
         }
         let channels = met.channels();
         let selection = lines.selection();
@@ -179,7 +179,7 @@ pub fn walk_once<R: Read, E: From<Error>>(
                     return Err(no_rates(path, format, "").into());
                 }
                 if is_judged && out.steps(sensors) == STEPS {
-                    sensors.check_nanos(path, format)?;
+                    sensors.check_stated(path, format)?;
                 }
                 let may_wait = lines.may_wait();
                 if may_wait || out.items.len() >= BATCH {
@@ -202,7 +202,7 @@ pub fn walk_once<R: Read, E: From<Error>>(
         return Err(no_rates(path, format, "").into());
     }
     if is_judged && out.steps(&sensors) < STEPS {
-        sensors.check_nanos(path, format)?;
+        sensors.check_stated(path, format)?;
     }
     if !is_enough {
         let _ = take(&mut out.items, false)?;

@@ -1,11 +1,11 @@
-//! Stamps that are nanoseconds by their name -> what to say of a sensor whose steps say another unit, once. Pure.
+//! Stamps that state their unit -> what to say of a sensor whose steps say another one, once. Pure.
 //!
 //! Apart from the stream because a replay refuses such a log, while a daemon goes on: all it can do is say so.
 
 use crate::report::findings::{Finding, Severity};
 use crate::serve::guard::fault::Fault;
 use strapd_attitude::condition::Clock;
-use strapd_attitude::record::RawSample;
+use strapd_attitude::record::{RawSample, TimeUnit};
 use strapd_recording::recording::stated_nanos::{StatedNanos, TooFast};
 
 /// Steps after which they are judged, again whenever their number has doubled, and for the last time: a sender may
@@ -17,6 +17,8 @@ const LAST: u64 = 8192;
 #[derive(Debug, Default)]
 pub(super) struct StampUnit {
     steps: StatedNanos,
+    /// The unit that the newest lines state.
+    stated: Option<TimeUnit>,
     judged: u64,
     found: Option<TooFast>,
     is_unsaid: bool,
@@ -28,9 +30,17 @@ impl StampUnit {
         self.is_unsaid = self.found.is_some();
     }
 
+    /// Takes the unit that lines state, before their samples come.
+    pub(super) fn state(&mut self, stated: Option<TimeUnit>) {
+        self.stated = stated;
+    }
+
     /// Begins a run.
     pub(super) fn begin(&mut self) {
-        *self = StampUnit::default();
+        *self = StampUnit {
+            stated: self.stated,
+            ..StampUnit::default()
+        };
     }
 
     /// Takes the next sample of the run.
@@ -49,7 +59,7 @@ impl StampUnit {
         }
         self.judged = steps;
         let was_found = self.found.is_some();
-        self.found = self.steps.too_fast();
+        self.found = self.steps.too_fast(self.stated);
         self.is_unsaid |= self.found.is_some() && !was_found;
     }
 
@@ -69,7 +79,8 @@ impl StampUnit {
     pub(super) fn finding(&self) -> Option<Finding> {
         let found = self.found.as_ref()?;
         let evidence = [
-            ("step_ns".to_owned(), found.step.into()),
+            ("step_ns".to_owned(), found.step_nanos().into()),
+            ("stated".to_owned(), found.stated.map(TimeUnit::name).into()),
             ("unit".to_owned(), found.unit().into()),
         ];
         Some(Finding {
@@ -86,7 +97,11 @@ impl StampUnit {
 
 fn advice(found: &TooFast) -> String {
     let unit = found.unit();
-    format!(
-        "send them as stamp_{unit}, or start the daemon with --field stamp=stamp_ns:{unit}; the attitude stands still until then"
-    )
+    let send = match found.stated.map(TimeUnit::name) {
+        Some(stated) => format!(
+            "send them as stamp_{unit}, or start the daemon with --field stamp=stamp_{stated}:{unit} (of a table --columns stamp=NAME:{unit})"
+        ),
+        None => "convert them before they are sent".to_owned(),
+    };
+    format!("{send}; the attitude stands still until then")
 }

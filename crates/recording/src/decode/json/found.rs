@@ -277,6 +277,18 @@ impl<'a> ObjectFields<'a> {
         }
     }
 
+    /// The unit that the name of its stamp states; of samples in an array the first one's.
+    pub(crate) fn stamp_unit(&self) -> Option<TimeUnit> {
+        let own = self.batch.iter().find_map(|found| found.stamp.as_ref());
+        match own.or(self.stamp.as_ref())?.1 {
+            Written::Number(_, TimeUnit::ByMagnitude) if self.px4 => Some(TimeUnit::Micro),
+            Written::Number(_, unit) | Written::Text(_, unit) => {
+                Some(unit).filter(|unit| *unit != TimeUnit::ByMagnitude)
+            }
+            Written::Pair(..) => None,
+        }
+    }
+
     /// The number behind an unlabelled stamp.
     pub(crate) fn unlabelled(&self) -> Option<Bare> {
         match self.instant(None, &mut Decoded::default()) {

@@ -10,7 +10,7 @@ use super::scan::Scanner;
 use crate::decode::refusal::exact_name;
 use crate::decode::{Bare, Decoded, GyroUnit, Options, Undecodable};
 use crate::text::printable;
-use strapd_attitude::record::{AccelUnit, Nanos, RawSample, SampleKind};
+use strapd_attitude::record::{AccelUnit, Nanos, RawSample, SampleKind, TimeUnit};
 
 /// Longest line that is read.
 pub const MAX_LINE: usize = 64 << 10;
@@ -49,6 +49,8 @@ pub struct Line {
     pub gyro_unit: Option<GyroUnit>,
     /// Unit of its specific force, where that is known: of a row by its table's columns.
     pub accel_unit: Option<AccelUnit>,
+    /// Unit of its stamps, where their name or a setting states it.
+    pub stamp_unit: Option<TimeUnit>,
     /// Number of samples, and what was noticed.
     pub decoded: Decoded,
     /// Stamps that are numbers without a unit, at the places of their samples, which have none until
@@ -170,6 +172,7 @@ impl LineDecoder {
             sample_kind: seeker.kind.as_deref().and_then(SampleKind::named).or(kind),
             gyro_unit: unit.or(stated),
             accel_unit: None,
+            stamp_unit: found.stamp_unit(),
             decoded,
             bare,
         })

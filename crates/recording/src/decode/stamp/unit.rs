@@ -36,6 +36,11 @@ impl Bare {
         Bare(i128::from(count) * 1_000_000_000)
     }
 
+    /// The number that counts so many nanoseconds in a unit that has a name.
+    pub(crate) fn of(nanos: i64, unit: TimeUnit) -> Bare {
+        Bare(i128::from(nanos) * 1_000_000_000 / i128::from(unit.nanos(0.0)))
+    }
+
     /// The instant, were this its unit; half a nanosecond is rounded away from zero.
     #[must_use]
     pub fn in_unit(self, unit: TimeUnit) -> Nanos {
