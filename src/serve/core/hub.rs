@@ -14,6 +14,7 @@ mod complaints;
 mod counters;
 mod heading;
 mod last_attitude;
+mod logging;
 mod places;
 mod polling;
 mod report;
@@ -500,16 +501,7 @@ impl Hub {
         self.deliver(sensor, id, text);
         let lost = self.judge(sensor, id, first);
         let faults = sensor.stream.news();
-        for line in sensor.stream.doubted(plan) {
-            log_throttle::warn(&format!("doubt {id} {line}"), &format!("{id}: {line}"));
-        }
-        let of_clock = [Fault::STAMP_UNIT, Fault::STILL_STAMPS];
-        for fault in faults.iter().filter(|f| of_clock.contains(&f.code)) {
-            log_throttle::warn(
-                &format!("{} {id}", fault.code),
-                &format!("{id}: {}", fault.message),
-            );
-        }
+        logging::log_doubts(&mut sensor.stream, plan, &faults);
         Ok(Feedback { note, faults, lost })
     }
 

@@ -14,6 +14,7 @@ pub(super) mod doubts;
 mod intervals;
 mod joining;
 mod losing;
+mod pace;
 pub(in crate::serve::core) mod resetting;
 pub mod run;
 mod stamp_unit;
@@ -30,11 +31,13 @@ use crate::serve::guard::fault::Fault;
 use crate::sink::Stream;
 use arrival::Arrivals;
 use attitude_now::attitude_now;
+use doubting::Logged;
 use doubts::Doubts;
 use intervals::Intervals;
 use joining::Joining;
 pub use losing::Fate;
 use losing::Losing;
+use pace::Pace;
 use resetting::Resetting;
 use run::SampleRun;
 use stamp_unit::StampUnit;
@@ -90,6 +93,10 @@ pub struct SensorStream {
     still_stamps: StillStamps,
     /// Findings about its samples; `None` of one of so many that they are not watched.
     doubts: Option<Box<Doubts>>,
+    /// Findings from its counts that are in the log.
+    logged: Logged,
+    /// Speed of its stamps beside their arrivals.
+    pace: Pace,
     /// Reset that was asked of it.
     resetting: Resetting,
     /// First stamp of the run.
@@ -200,6 +207,8 @@ impl SensorStream {
             id,
             estimator,
             doubts,
+            logged: Logged::default(),
+            pace: Pace::default(),
             resolved,
             prepared,
             joining: Joining::Undecided,
@@ -365,6 +374,7 @@ impl SensorStream {
                 self.intervals.take(raw, plan.clock, kind);
                 self.stamp_unit.take(raw, plan.clock);
                 self.still_stamps.take(raw, plan.clock);
+                self.pace.take(raw, plan.clock);
             }
         }
         self.first = self.first.or(self.conditioning().first);

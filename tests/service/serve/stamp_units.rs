@@ -2,8 +2,10 @@
 //! goes on.
 
 use super::client::Client;
-use super::daemon::{Daemon, TCP, eventually, listening};
+use super::daemon::{Daemon, Process, TCP, eventually, listening};
 use serde_json::Value;
+use std::io::{BufRead, Read};
+use std::time::Duration;
 
 /// Samples with these stamps.
 fn lines(stamps: impl Iterator<Item = i64>) -> String {
@@ -120,5 +122,54 @@ fn fast_sensors_and_what_was_held_back_are_no_other_unit() {
         let said = codes_said(&daemon, &lines((0..600).map(stamp)));
         assert_eq!(said, Vec::<Value>::new());
         assert_eq!(findings(&daemon), Vec::<Value>::new());
+    }
+}
+
+/// Warnings in the log of a daemon that is sent these lines a hundredth of a second apart.
+fn warnings(sent: &str) -> Vec<String> {
+    let mut daemon = Process::start(&["--listen", TCP]);
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.object("VERSION");
+    for line in sent.lines() {
+        sender.send(line);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    sender.shut();
+    sender.rest();
+    daemon.signal("TERM");
+    assert_eq!(daemon.exit(), Some(0));
+    let log = daemon.log.by_ref().lines().map(|line| line.unwrap());
+    let warnings = log.filter(|line| line.contains("\"WARN\""));
+    warnings.filter(|line| line.contains("imu0: ")).collect()
+}
+
+#[test]
+fn findings_of_counts_are_in_the_log_once_with_the_unit_that_the_arrivals_tell() {
+    for (unit, stamp, words) in [
+        (
+            "s",
+            (|n| 10 * n) as fn(i64) -> i64,
+            "milliseconds that are called seconds",
+        ),
+        (
+            "ms",
+            |n| 10_000 * n,
+            "microseconds that are called milliseconds",
+        ),
+        ("ms", |n| 100_000 - 10 * n, "a clock was set"),
+        ("ms", |n| 10 * n, ""),
+    ] {
+        let sent = lines_in(unit, (0..150).map(stamp));
+        // Slow enough for steps of ten seconds.
+        let said = warnings(&sent.replace(",0,0.0", ",0,0.000"));
+        assert_eq!(
+            said.len(),
+            usize::from(!words.is_empty()),
+            "{unit}: {said:?}"
+        );
+        assert!(
+            said.iter().all(|line| line.contains(words)),
+            "{words}: {said:?}"
+        );
     }
 }

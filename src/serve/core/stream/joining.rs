@@ -2,6 +2,8 @@
 //!
 //! Apart from the samples because it happens once a connection: afterwards a sample is only taken.
 
+use super::doubting::Logged;
+use super::pace::Pace;
 use super::run::{OrderedBy, RunPlacement, Span};
 use super::{SensorStream, expecting};
 use crate::pipeline::session_builder::labelled;
@@ -37,6 +39,7 @@ impl SensorStream {
         self.intervals.reopen();
         self.stamp_unit.meet();
         self.still_stamps.meet();
+        self.pace = Pace::default();
         self.arrivals = None;
     }
 
@@ -168,6 +171,7 @@ impl SensorStream {
         self.intervals.begin();
         self.stamp_unit.begin();
         self.still_stamps.begin();
+        self.logged = Logged::default();
         self.runs += 1;
         let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
         let seen = match before.first {

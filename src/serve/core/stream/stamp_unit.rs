@@ -35,6 +35,11 @@ impl StampUnit {
         self.stated = stated;
     }
 
+    /// The unit that the newest lines state.
+    pub(super) fn stated(&self) -> Option<TimeUnit> {
+        self.stated
+    }
+
     /// Begins a run.
     pub(super) fn begin(&mut self) {
         *self = StampUnit {
