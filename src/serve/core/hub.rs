@@ -453,13 +453,7 @@ impl Hub {
         }
         sensor.heard = self.sensors.heard.fetch_add(1, Ordering::Relaxed);
         sensor.heard_at = self.sensors.tick.load(Ordering::Relaxed);
-        if !sensor.stream.agrees(self.sensors.plan_of(&id), run.head) {
-            return Err(refuse(
-                "meaning_changed",
-                Kind::Loss,
-                "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`",
-            ));
-        }
+        let anew = sensor.stream.understand(self.sensors.plan_of(&id), run)?;
         count(&self.counters.samples, rates_in(run.samples));
         let taken = sensor.stream.stamped(run);
         let (lines, samples) = match &taken {
@@ -469,7 +463,10 @@ impl Hub {
         if sensor.stream.is_waiting() {
             self.sensors.stamps_wait.store(true, Ordering::Relaxed);
         }
-        self.integrate(&mut sensor, lines, samples, (run.placed, run.first), text)
+        let place = (run.placed, run.first);
+        let feedback = self.integrate(&mut sensor, lines, samples, place, text)?;
+        let note = anew.or(feedback.note);
+        Ok(Feedback { note, ..feedback })
     }
 
     /// Samples whose stamps are known -> attitudes.

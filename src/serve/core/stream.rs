@@ -14,6 +14,7 @@ pub(super) mod doubts;
 mod intervals;
 mod joining;
 mod losing;
+mod meaning;
 mod pace;
 pub(in crate::serve::core) mod resetting;
 pub mod run;
@@ -37,6 +38,7 @@ use intervals::Intervals;
 use joining::Joining;
 pub use losing::Fate;
 use losing::Losing;
+use meaning::declared;
 use pace::Pace;
 use resetting::Resetting;
 use run::SampleRun;
@@ -75,6 +77,8 @@ pub struct SensorStream {
     prepared: Prepared,
     /// Progress of a sender that has just come, whose first stamp is still to decide where it stands.
     joining: Joining,
+    /// Whether its sender may still state another meaning than the one before: none of its rates have come.
+    is_meaning_open: bool,
     /// State to go on from, until a stamp has decided that.
     saved: Option<Saved>,
     /// The unit of stamps that do not say theirs.
@@ -170,13 +174,7 @@ impl SensorStream {
             id: Some(id.to_string()),
             ..Fault::new("not_ready", what.to_string())
         };
-        let declared = Declared {
-            sample_kind: stated.sample_kind,
-            gyro_unit: stated.gyro_unit,
-            accel_unit: stated.accel_unit,
-            ..Declared::default()
-        };
-        let resolved = Meaning::new(plan, &declared);
+        let resolved = Meaning::new(plan, &declared(stated));
         let memory = saved.as_ref().and_then(Saved::memory);
         let plan = &expecting(plan, memory.is_some_and(Memory::has_forces_beside));
         let mut prepared = at_once(plan, &resolved, together).map_err(fault)?;
@@ -212,6 +210,7 @@ impl SensorStream {
             resolved,
             prepared,
             joining: Joining::Undecided,
+            is_meaning_open: true,
             stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
             arrivals: None,
             ambiguous: None,
@@ -247,14 +246,6 @@ impl SensorStream {
     #[must_use]
     pub fn id(&self) -> &Arc<str> {
         &self.id
-    }
-
-    /// Whether a later line means the same by its numbers as the first. `plan` wins over both.
-    #[must_use]
-    pub fn agrees(&self, plan: &EstimationSettings, line: &Line) -> bool {
-        let (kind, unit) = (self.estimator.sample_kind().kind, self.resolved.unit);
-        plan.kind.or(line.sample_kind).unwrap_or(kind) == kind
-            && plan.unit.or(line.gyro_unit).unwrap_or(unit) == unit
     }
 
     /// Labels in a recording.

@@ -263,6 +263,48 @@ fn two_connections_never_feed_one_attitude_and_the_second_takes_over_from_one_th
 }
 
 #[test]
+fn a_connection_that_means_something_else_begins_a_run_in_that_meaning() {
+    let daemon = Daemon::tcp();
+    let table = |header: &str, from: u64| {
+        let row = |n| format!("{},0,0,90\n", from + 10 * n);
+        header.to_owned() + &(0..21_u64).map(row).collect::<String>()
+    };
+    let send = |sent: String| {
+        let mut client = Client::tcp(daemon.address(0));
+        client.send_bytes(sent.as_bytes());
+        client.shut();
+        let said = client.rest();
+        eventually("the sender to leave", || daemon.hub.connected() == 1);
+        said
+    };
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    send(table("time_ms,gx,gy,gz\n", 1000));
+    // The stamps go on: the run would, too.
+    let said = send(table("time_ms,gyro_x_dps,gyro_y_dps,gyro_z_dps\n", 2000));
+    let notes: Vec<_> = said.iter().filter(|s| s["class"] == "NOTE").collect();
+    assert_eq!(notes.len(), 1, "{said:?}");
+    assert_eq!(notes[0]["code"], "new_run");
+    let words = "something else now (rad/s before, deg/s now): begun again, reset 1";
+    assert!(
+        notes[0]["message"].as_str().unwrap().ends_with(words),
+        "{}",
+        notes[0]
+    );
+    assert!(said.iter().all(|s| s["class"] != "ERROR"), "{said:?}");
+    let last = (0..42).map(|_| watcher.object("ATT")).last().unwrap();
+    let half = last["q"]["w"].as_f64().unwrap().acos();
+    // 90 deg/s for 0.2 s, from where the attitude began again.
+    assert!((2.0 * half.to_degrees() - 18.0).abs() < 0.1, "{last}");
+    let status = daemon.status();
+    let source = &status["sources"][0];
+    assert_eq!(source["gyro_unit"], "deg");
+    for (key, count) in [("new_runs", 1), ("reset", 1), ("samples", 42), ("lost", 0)] {
+        assert_eq!(source[key], count, "{key}: {source}");
+    }
+    assert_eq!(status["counters"]["samples_refused"], 0);
+}
+
+#[test]
 fn a_sensor_that_changes_its_meaning_is_refused_and_missing_numbers_are_counted() {
     let daemon = Daemon::tcp();
     let mut client = Client::tcp(daemon.address(0));
@@ -270,7 +312,11 @@ fn a_sensor_that_changes_its_meaning_is_refused_and_missing_numbers_are_counted(
     client.send(&rate("a", 0, 1.0));
     client.send(&rate("a", 5, 1.0));
     client.send("{\"class\":\"RATE\",\"id\":\"a\",\"sample_kind\":\"delta-angle\",\"stamp\":{\"sec\":1700000000,\"nsec\":6000000},\"gyro\":[1,0,0]}");
-    assert_eq!(client.object("ERROR")["code"], "meaning_changed");
+    let error = client.object("ERROR");
+    assert_eq!(error["code"], "meaning_changed");
+    let message = error["message"].as_str().unwrap();
+    assert!(message.contains("before, delta-angle now"), "{message}");
+    assert!(message.contains("?id=NAME"), "{message}");
     let source = source(&daemon, "a", 2);
     assert_eq!(source["missing"], 4);
     // Nothing stated it: by the step of 5 ms.

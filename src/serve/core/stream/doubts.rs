@@ -87,6 +87,14 @@ impl Doubts {
         self.said.clear();
     }
 
+    /// Forgets what was found before of samples that `estimator` reads in another way.
+    pub(super) fn forget(&mut self, estimator: &Estimator) {
+        self.lasting = Lasting {
+            settings: estimator.settings_fingerprint(),
+            found: BTreeMap::new(),
+        };
+    }
+
     /// Takes the next sample, as it came.
     #[inline]
     pub(super) fn take(&mut self, raw: &RawSample) {

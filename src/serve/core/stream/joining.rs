@@ -12,7 +12,7 @@ use crate::serve::guard::fault::Fault;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, StampRepair};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{EstimationSettings, Estimator, Forces, at_once};
+use strapd_attitude::estimate::{EstimationSettings, Estimator, Forces, Meaning, at_once};
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::Bare;
 
@@ -40,6 +40,7 @@ impl SensorStream {
         self.stamp_unit.meet();
         self.still_stamps.meet();
         self.pace = Pace::default();
+        self.is_meaning_open = true;
         self.arrivals = None;
     }
 
@@ -141,38 +142,8 @@ impl SensorStream {
         stamp: Nanos,
         before: Span,
     ) -> Result<Fault, Fault> {
-        let fault = |what: Diagnostic| Fault {
-            id: Some(self.id.to_string()),
-            ..Fault::new("not_ready", what.to_string())
-        };
-        let forces = self.prepared.aiding.map(|aiding| aiding.forces);
-        let plan = &expecting(plan, forces == Some(Forces::Beside));
-        let mut prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
-        prepared.has_arrival = plan.stamps == StampRepair::Auto;
-        prepared.batches = self.conditioning().batches;
-        let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
-        let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
-        if labels.world_axes != self.channel.stream().world_axes {
-            return Err(fault(format!(
-                "a run that begins between other axes ({}) than those announced ({}); give it another `id`",
-                labels.world_axes,
-                self.channel.stream().world_axes
-            ).into()));
-        }
-        let saved = self.saved.take().map(|saved| saved.resets());
-        let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
-        estimator.continue_counts_of(self.conditioning(), resets);
-        if let Some(doubts) = &mut self.doubts {
-            doubts.begin(&self.resolved, &prepared, &mut estimator);
-        }
-        (self.estimator, self.prepared) = (estimator, prepared);
-        (self.first, self.last) = (None, None);
+        let resets = self.rebuild(plan, self.resolved.clone(), &[*raw])?;
         self.joining = Joining::Joined;
-        self.intervals.begin();
-        self.stamp_unit.begin();
-        self.still_stamps.begin();
-        self.logged = Logged::default();
-        self.runs += 1;
         let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
         let seen = match before.first {
             Some(first) => format!("{:.6} s to {:.6} s", secs(first), secs(before.last)),
@@ -189,6 +160,51 @@ impl SensorStream {
                 ),
             )
         })
+    }
+
+    /// Makes the estimator anew for samples that mean this, of which `together` are the first: only what was counted goes
+    /// on. The number of resets so far comes back.
+    ///
+    /// # Errors
+    /// The fault to answer with, and nothing has changed: a run cannot begin with these samples.
+    pub(super) fn rebuild(
+        &mut self,
+        plan: &EstimationSettings,
+        resolved: Meaning,
+        together: &[RawSample],
+    ) -> Result<u32, Fault> {
+        let fault = |what: Diagnostic| Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new("not_ready", what.to_string())
+        };
+        let forces = self.prepared.aiding.map(|aiding| aiding.forces);
+        let plan = &expecting(plan, forces == Some(Forces::Beside));
+        let mut prepared = at_once(plan, &resolved, together).map_err(fault)?;
+        prepared.has_arrival = plan.stamps == StampRepair::Auto;
+        prepared.batches = self.conditioning().batches;
+        let mut estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        let labels = labelled(stream_of(&self.id), plan, &resolved, &prepared);
+        if labels.world_axes != self.channel.stream().world_axes {
+            return Err(fault(format!(
+                "a run that begins between other axes ({}) than those announced ({}); give it another `id`",
+                labels.world_axes,
+                self.channel.stream().world_axes
+            ).into()));
+        }
+        let saved = self.saved.take().map(|saved| saved.resets());
+        let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
+        estimator.continue_counts_of(self.conditioning(), resets);
+        if let Some(doubts) = &mut self.doubts {
+            doubts.begin(&resolved, &prepared, &mut estimator);
+        }
+        (self.estimator, self.resolved, self.prepared) = (estimator, resolved, prepared);
+        (self.first, self.last) = (None, None);
+        self.intervals.begin();
+        self.stamp_unit.begin();
+        self.still_stamps.begin();
+        self.logged = Logged::default();
+        self.runs += 1;
+        Ok(resets)
     }
 
     /// Whether a sample is one that was taken before, and now is only counted.
