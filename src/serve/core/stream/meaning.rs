@@ -1,4 +1,4 @@
-//! What a sender's first rates mean -> the run goes on, or begins anew in another meaning. Pure.
+//! Meaning of a sender's first rates -> the run goes on, or begins anew in another meaning. Pure.
 //!
 //! Apart from [`joining`](super::joining) because a meaning is stated before any stamp is known.
 
