@@ -134,7 +134,7 @@ mod tests {
             let [fault] = faults.as_slice() else {
                 panic!("{faults:?}")
             };
-            assert!(fault.message.contains("--time log"), "{}", fault.message);
+            assert!(fault.message.contains("time log"), "{}", fault.message);
         }
         // It stops on the way, and goes on again.
         assert!(told(|k| k.min(100) * 10_000_000).0.is_some());
