@@ -211,14 +211,10 @@ impl ErrorExplanation {
             }
         }
         if let Some(fit) = &self.axes {
-            let [w, x, y, z] = fit.turn.wxyz();
             let _ = writeln!(
                 out,
-                "  axes     the reference is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from the estimate's: {} deg over 1 s, {} with the turn; \
-                 compare does not turn them: strapd replay LOG with --base-frame NAME or --mount q=W,X,Y,Z, and --against-recorded",
-                fit.angle().to_degrees(),
-                significant(fit.as_recorded.to_degrees(), 3),
-                significant(fit.turned.to_degrees(), 3),
+                "  axes     {}; compare does not turn them: strapd replay LOG with --base-frame NAME or --mount q=W,X,Y,Z, and --against-recorded",
+                against::axes_words(fit, "the reference", "the estimate's")
             );
         }
         if let Some(fit) = &self.bias {
@@ -388,15 +384,10 @@ fn as_json(
             "bias_left".to_owned(),
             told.bias.as_ref().map(against::bias_json).into(),
         );
-        let axes = |fit: &BodyAxesFit| {
-            serde_json::json!({
-                "turn_wxyz": fit.turn.wxyz(),
-                "angle_deg": fit.angle().to_degrees(),
-                "as_recorded_deg": fit.as_recorded.to_degrees(),
-                "turned_deg": fit.turned.to_degrees(),
-            })
-        };
-        object.insert("other_axes".to_owned(), told.axes.as_ref().map(axes).into());
+        object.insert(
+            "other_axes".to_owned(),
+            told.axes.as_ref().map(against::axes_json).into(),
+        );
     }
     value
 }

@@ -3,7 +3,7 @@
 use super::{Finding, Severity};
 use crate::inspection::CheckedTopic;
 use crate::summary::against::{
-    beyond_sigma, bias_json, bias_words, consistency_json, removing, resets,
+    axes_json, axes_words, beyond_sigma, bias_json, bias_words, consistency_json, removing, resets,
 };
 use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
@@ -17,7 +17,7 @@ use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_K
 const CLEARLY: f64 = 0.95;
 /// A bias explains an error when it leaves less than this share of it.
 const EXPLAINED: f64 = 0.4;
-/// Errors over 1 s below this need no explanation, rad (2 degrees).
+/// Turns over 1 s above this are a motion, rad (2 degrees).
 const SMALL: f64 = 0.035;
 /// Share of the time in gaps above which the rotation is not known.
 const MOSTLY_THERE: f64 = 0.5;
@@ -310,15 +310,13 @@ fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
     if fit.agrees() {
         return true;
     }
-    let [w, x, y, z] = fit.turn.wxyz();
     let deg = f64::to_degrees;
     let evidence = |finding: Finding| {
-        finding
-            .with("pairs", fit.pairs)
-            .with("median_turn_deg", deg(fit.median_turn))
-            .with("as_recorded_deg", deg(fit.as_recorded))
-            .with("turned_deg", deg(fit.turned))
-            .with("turn_wxyz", json!([w, x, y, z]))
+        let json = axes_json(fit);
+        let found = json.as_object().into_iter().flatten();
+        found.fold(finding, |finding, (name, value)| {
+            finding.with(name, value.clone())
+        })
     };
     if fit.inverse {
         out.push(evidence(
@@ -336,16 +334,12 @@ fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
         return false;
     }
     if fit.are_others() {
+        let [w, x, y, z] = fit.turn.wxyz();
         out.push(evidence(
             Finding::new(
                 Severity::Warning,
                 "orientation-other-axes",
-                format!(
-                    "the recorded orientation is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from the gyro's: {} deg over 1 s as recorded, {} deg with the turn",
-                    deg(fit.angle()),
-                    significant(deg(fit.as_recorded), 3),
-                    significant(deg(fit.turned), 3)
-                ),
+                axes_words(fit, "the recorded orientation", "the gyro's"),
             )
             .advise("state the gyro's axes, or its mounting")
             .help([MOUNT.to(format!("q={w:.6},{x:.6},{y:.6},{z:.6}"))]),

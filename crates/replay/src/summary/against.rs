@@ -113,6 +113,19 @@ pub fn bias_words(fit: &BiasFit, who: &str, whom: &str) -> String {
     )
 }
 
+/// Other body axes in one line: those of `who` against those `whose` they should be.
+#[must_use]
+pub fn axes_words(fit: &BodyAxesFit, who: &str, whose: &str) -> String {
+    let [w, x, y, z] = fit.turn.wxyz();
+    let deg = |radians: f64| significant(radians.to_degrees(), 3);
+    format!(
+        "{who} is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from {whose}: {} deg over 1 s as recorded, {} deg with the turn",
+        fit.angle().to_degrees(),
+        deg(fit.as_recorded),
+        deg(fit.turned)
+    )
+}
+
 /// Setting that removes it, beside what was removed already.
 #[must_use]
 pub fn removing(fit: &BiasFit, removed: [f64; 3]) -> Choice {
@@ -156,6 +169,19 @@ pub fn bias_json(fit: &BiasFit) -> Value {
         "long_s": fit.long_secs,
         "over_long_deg": fit.over_long.map(f64::to_degrees),
         "worth_removing": fit.is_worth_removing(),
+    })
+}
+
+/// JSON for machines.
+#[must_use]
+pub fn axes_json(fit: &BodyAxesFit) -> Value {
+    json!({
+        "pairs": fit.pairs,
+        "median_turn_deg": fit.median_turn.to_degrees(),
+        "as_recorded_deg": fit.as_recorded.to_degrees(),
+        "turned_deg": fit.turned.to_degrees(),
+        "turn_wxyz": fit.turn.wxyz(),
+        "angle_deg": fit.angle().to_degrees(),
     })
 }
 

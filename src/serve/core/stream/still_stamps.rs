@@ -66,13 +66,11 @@ impl StillStamps {
 
     /// Returns the fault to report to the sender, once.
     pub(super) fn news(&mut self, id: &str) -> Option<Fault> {
-        let found = self.finding()?;
-        std::mem::take(&mut self.is_unsaid).then(|| Fault {
+        let is_news = std::mem::take(&mut self.is_unsaid);
+        let found = is_news.then(|| self.finding())??;
+        Some(Fault {
             id: Some(id.to_owned()),
-            ..Fault::new(
-                Fault::STILL_STAMPS,
-                format!("{}; {}: {}", found.what, found.advice, found.flags()),
-            )
+            ..Fault::new(Fault::STILL_STAMPS, found.line())
         })
     }
 
@@ -128,7 +126,9 @@ mod tests {
             (5_000_000, "stand still at 0.005000 s"),
         ] {
             let (finding, faults) = told(|_| at);
-            let finding = finding.unwrap();
+            let Some(finding) = finding else {
+                panic!("{words}")
+            };
             assert!(finding.what.contains(words), "{}", finding.what);
             assert_eq!(finding.evidence["samples"], 400);
             let [fault] = faults.as_slice() else {
