@@ -16,6 +16,8 @@ use clap::{ArgAction, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_recording::text::nearest;
+use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 /// A larger file is no configuration.
@@ -94,32 +96,33 @@ pub fn run(args: &Config) -> Result<Outcome> {
 /// # Errors
 /// [`strapd_recording::Error::Open`], [`Error::Usage`] naming file and key.
 pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
-    let mut table = read(file)?;
+    let file = &ConfigFile::read(file)?;
+    let mut table = file.table()?;
     let sensors = match table.remove("sensor") {
         None => Table::new(),
         Some(Value::Table(sensors)) => sensors,
-        Some(_) => return Err(bad(file, "`sensor` is no table; expected [sensor.ID]")),
+        Some(_) => return Err(file.bad("`sensor` is no table; expected [sensor.ID]")),
     };
     let sources = sources(file, table.remove("source"))?;
     let command = Cli::command();
     let parse = |argv: &[OsString]| command.clone().try_get_matches_from(argv);
-    let first = parse(&argv).map_err(|e| bad(file, e.to_string().trim_end()))?;
+    let first = parse(&argv).map_err(|e| file.bad(e.to_string().trim_end()))?;
     let first = subcommand(file, &first)?;
     let serve = Serve::augment_args(clap::Command::new("serve"));
     let mut whole = argv;
-    let from_file = extend(&mut whole, file, "", &serve, &table, Some(&first))?;
+    let from_file = extend(&mut whole, file, &[], &serve, &table, Some(&first))?;
     let sources_from_file = !is_given(&first, "sources") && !sources.is_empty();
     if sources_from_file {
         whole.push("--".into());
         whole.extend(sources.into_iter().map(OsString::from));
     }
-    let matches = parse(&whole).map_err(|e| bad(file, e.to_string().trim_end()))?;
+    let matches = parse(&whole).map_err(|e| file.bad(e.to_string().trim_end()))?;
     let Ok(Cli {
         command: Command::Serve(args),
         ..
     }) = Cli::from_arg_matches(&matches)
     else {
-        return Err(bad(file, "is for strapd serve"));
+        return Err(file.bad("is for strapd serve"));
     };
     let matches = subcommand(file, &matches)?;
     let sensors = sensors
@@ -138,18 +141,18 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
 /// Estimation settings of one sensor of the file, and the arguments they were told by. `first` is what the command line
 /// says, `whole` what it says with the file.
 fn sensor(
-    file: &Path,
+    file: &ConfigFile<'_>,
     id: String,
     value: Value,
     (first, whole): (&ArgMatches, &ArgMatches),
 ) -> Result<SensorArgs> {
     let name = format!("[sensor.{id}]");
     let Value::Table(own) = value else {
-        return Err(bad(file, format!("{name} is no table")));
+        return Err(file.bad(format!("{name} is no table")));
     };
     let known = Sensor::command();
     let mut argv = vec![OsString::from("sensor")];
-    extend(&mut argv, file, &name, &known, &own, Some(first))?;
+    extend(&mut argv, file, &["sensor", &id], &known, &own, Some(first))?;
     let added = argv.len();
     // What holds for all holds for this one where it says nothing else.
     for arg in known.get_arguments() {
@@ -158,35 +161,99 @@ fn sensor(
             inherit(&mut argv, whole, arg);
         }
     }
-    let parsed = Sensor::try_parse_from(&argv).map_err(|e| bad(file, format!("{name}: {e}")))?;
+    let parsed = Sensor::try_parse_from(&argv).map_err(|e| file.bad(format!("{name}: {e}")))?;
     argv.truncate(added);
     Ok((id, parsed.estimation, argv.split_off(1)))
 }
 
-fn bad(file: &Path, what: impl Into<Diagnostic>) -> Error {
-    let place = format!("--config {}", file.display());
-    Error::usage(what.into().at(place))
+/// A configuration file, and its text.
+struct ConfigFile<'a> {
+    path: &'a Path,
+    text: String,
 }
 
-fn read(file: &Path) -> Result<Table> {
-    let open = |source| strapd_recording::Error::Open {
-        path: file.to_owned(),
-        source,
-    };
-    let metadata = std::fs::metadata(file).map_err(open)?;
-    if !metadata.is_file() || metadata.len() > MAX_BYTES {
-        return Err(bad(file, "is no text file of a sensible size"));
+impl<'a> ConfigFile<'a> {
+    fn read(path: &'a Path) -> Result<ConfigFile<'a>> {
+        let open = |source| strapd_recording::Error::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let metadata = std::fs::metadata(path).map_err(open)?;
+        let mut file = ConfigFile {
+            path,
+            text: String::new(),
+        };
+        if !metadata.is_file() || metadata.len() > MAX_BYTES {
+            return Err(file.bad("is no text file of a sensible size"));
+        }
+        file.text = std::fs::read_to_string(path).map_err(open)?;
+        Ok(file)
     }
-    let text = std::fs::read_to_string(file).map_err(open)?;
-    text.parse::<Table>()
-        .map_err(|e| bad(file, e.to_string().trim_end()))
+
+    fn table(&self) -> Result<Table> {
+        let table = self.text.parse::<Table>();
+        table.map_err(|e| self.bad(e.to_string().trim_end()))
+    }
+
+    fn bad(&self, what: impl Into<Diagnostic>) -> Error {
+        let place = format!("--config {}", self.path.display());
+        Error::usage(what.into().at(place))
+    }
+
+    /// Line of a key of a table of tables, from 1.
+    fn line(&self, tables: &[&str], key: &str) -> Option<usize> {
+        let whole = DeTable::parse(&self.text).ok()?;
+        let mut table = whole.get_ref();
+        for name in tables {
+            table = match table
+                .iter()
+                .find(|(key, _)| key.get_ref() == name)?
+                .1
+                .get_ref()
+            {
+                DeValue::Table(table) => table,
+                _ => return None,
+            };
+        }
+        let (key, _) = table.iter().find(|(known, _)| known.get_ref() == key)?;
+        let before = self.text.get(..key.span().start)?;
+        Some(before.matches('\n').count() + 1)
+    }
+
+    /// Line and table of a key, before what is said of it.
+    fn place(&self, tables: &[&str], key: &str) -> String {
+        let line = self.line(tables, key);
+        let line = line.map_or_else(String::new, |line| format!("line {line}: "));
+        match tables {
+            [] => line,
+            tables => format!("{line}[{}] ", tables.join(".")),
+        }
+    }
+
+    /// The error of a key that is not among the `known` ones of a table of tables.
+    fn unknown_key(&self, tables: &[&str], key: &str, known: &[&str]) -> Error {
+        let is_of_the_daemon = || {
+            let serve = Serve::augment_args(clap::Command::new("serve"));
+            !tables.is_empty() && serve.get_arguments().any(|arg| arg.get_long() == Some(key))
+        };
+        let help = match (known, nearest(key, known.iter().copied())) {
+            ([one], _) => format!("there is {one}"),
+            (_, Some(near)) => format!("there is {near}"),
+            _ if is_of_the_daemon() => {
+                format!("{key} is one for all sensors: above the first table of the file")
+            }
+            _ => "the keys are the long flags of strapd serve, those of [sensor.ID] its settings (docs/settings.md)".to_owned(),
+        };
+        let place = self.place(tables, key);
+        self.bad(Diagnostic::new(format!("{place}unknown key `{key}`")).help(help))
+    }
 }
 
-fn subcommand(file: &Path, matches: &ArgMatches) -> Result<ArgMatches> {
+fn subcommand(file: &ConfigFile<'_>, matches: &ArgMatches) -> Result<ArgMatches> {
     matches
         .subcommand_matches("serve")
         .cloned()
-        .ok_or_else(|| bad(file, "is for strapd serve"))
+        .ok_or_else(|| file.bad("is for strapd serve"))
 }
 
 /// Whether a value was given as a flag or in the environment.
@@ -198,12 +265,12 @@ fn is_given(matches: &ArgMatches, id: &str) -> bool {
 }
 
 /// The sources a file names: a list of addresses, or tables whose names name the sensors.
-fn sources(file: &Path, value: Option<Value>) -> Result<Vec<String>> {
+fn sources(file: &ConfigFile<'_>, value: Option<Value>) -> Result<Vec<String>> {
     const EXPECTED: &str =
         "expected source = [\"tcp://HOST:PORT\", ...], or [source.ID] with uri = \"...\"";
     let text = |value: Value| match value {
         Value::String(text) => Ok(text),
-        _ => Err(bad(file, format!("`source`: {EXPECTED}"))),
+        _ => Err(file.bad(format!("`source`: {EXPECTED}"))),
     };
     match value {
         None => Ok(Vec::new()),
@@ -212,17 +279,13 @@ fn sources(file: &Path, value: Option<Value>) -> Result<Vec<String>> {
             .into_iter()
             .map(|(id, value)| {
                 let Value::Table(mut own) = value else {
-                    return Err(bad(file, format!("[source.{id}]: {EXPECTED}")));
+                    return Err(file.bad(format!("[source.{id}]: {EXPECTED}")));
                 };
                 let uri = own
                     .remove("uri")
-                    .ok_or_else(|| bad(file, format!("[source.{id}]: uri is missing")))?;
+                    .ok_or_else(|| file.bad(format!("[source.{id}]: uri is missing")))?;
                 if let Some(other) = own.keys().next() {
-                    return Err(bad(
-                        file,
-                        Diagnostic::new(format!("[source.{id}] unknown key `{other}`"))
-                            .help("there is uri"),
-                    ));
+                    return Err(file.unknown_key(&["source", &id], other, &["uri"]));
                 }
                 let uri = text(uri)?;
                 let joint = if uri.contains('?') { '&' } else { '?' };
@@ -236,28 +299,23 @@ fn sources(file: &Path, value: Option<Value>) -> Result<Vec<String>> {
 /// Adds the keys of `table` to the arguments, but for those `given` already; returns those added.
 fn extend(
     argv: &mut Vec<OsString>,
-    file: &Path,
-    place: &str,
+    file: &ConfigFile<'_>,
+    tables: &[&str],
     known: &clap::Command,
     table: &Table,
     given: Option<&ArgMatches>,
 ) -> Result<Vec<String>> {
     let mut added = Vec::new();
     for (key, value) in table {
-        let arg = known
-            .get_arguments()
-            .find(|a| a.get_long() == Some(key) && key != "config")
-            .ok_or_else(|| {
-                let names: Vec<&str> = known
-                    .get_arguments()
-                    .filter_map(clap::Arg::get_long)
-                    .collect();
-                bad(
-                    file,
-                    Diagnostic::new(format!("{place} unknown key `{key}`"))
-                        .help(format!("the keys are the long flags: {}", names.join(", "))),
-                )
-            })?;
+        let flags = || {
+            known
+                .get_arguments()
+                .filter(|a| a.get_long() != Some("config"))
+        };
+        let Some(arg) = flags().find(|a| a.get_long() == Some(key)) else {
+            let keys: Vec<&str> = flags().filter_map(clap::Arg::get_long).collect();
+            return Err(file.unknown_key(tables, key, &keys));
+        };
         if given.is_some_and(|m| is_given(m, arg.get_id().as_str())) {
             continue;
         }
@@ -277,13 +335,10 @@ fn extend(
                 Value::Integer(n) => n.to_string(),
                 Value::Float(x) => x.to_string(),
                 other => {
-                    return Err(bad(
-                        file,
-                        format!(
-                            "{place} `{key}` is a {}, which no flag takes",
-                            other.type_str()
-                        ),
-                    ));
+                    let (place, kind) = (file.place(tables, key), other.type_str());
+                    return Err(
+                        file.bad(format!("{place}`{key}` is a {kind}, which no flag takes"))
+                    );
                 }
             };
             argv.push(format!("--{key}={text}").into());

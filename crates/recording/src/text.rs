@@ -48,6 +48,23 @@ pub fn snippet(bytes: &[u8]) -> String {
     escaped(&String::from_utf8_lossy(head), MAX_NEAR)
 }
 
+/// Likeness of two names, 1 of equal ones, from which one is meant for the other.
+const ALIKE: f64 = 0.75;
+
+/// The nearest of `names` to one that is not among them; `None` where none is like it.
+#[must_use]
+pub fn nearest<T: AsRef<str>>(wanted: &str, names: impl Iterator<Item = T>) -> Option<T> {
+    let alike = |name: T| {
+        let likeness = strsim::normalized_damerau_levenshtein(wanted, name.as_ref());
+        (likeness >= ALIKE).then_some((likeness, name))
+    };
+    let best = names.filter_map(alike).max_by(|(a, x), (b, y)| {
+        // Of two as near the first by name, whatever the order they come in.
+        a.total_cmp(b).then_with(|| y.as_ref().cmp(x.as_ref()))
+    });
+    best.map(|(_, name)| name)
+}
+
 /// A text without the byte order mark that spreadsheets put before it.
 pub(crate) fn without_mark(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)

@@ -63,6 +63,22 @@ fn what_is_wrong_in_a_file_is_named_with_its_place() {
         ("\n\ngyro-unit = deg", "line 3"),
         ("gyro-units = \"deg\"", "unknown key `gyro-units`"),
         ("config = \"other\"", "unknown key `config`"),
+        (
+            "# mine\n\ngyro_unit = \"deg\"",
+            "line 3: unknown key `gyro_unit`\n  help: there is gyro-unit",
+        ),
+        (
+            "[sensor.\"a b\"]\nbody = \"frd\"\nworlds = \"ned\"",
+            "line 3: [sensor.a b] unknown key `worlds`\n  help: there is world",
+        ),
+        (
+            "[sensor.a]\nlisten = \"x\"",
+            "listen is one for all sensors",
+        ),
+        (
+            "[sensor.a]\n\nbias = 1979-05-27",
+            "line 3: [sensor.a] `bias`",
+        ),
         ("gyro-unit = \"degrees\"", "degrees"),
         ("gyro-unit = 1979-05-27", "datetime"),
         ("listen = \"ftp://x\"", "known: tcp-listen"),

@@ -394,7 +394,7 @@ fn a_file_names_sources_and_their_sensors() {
         ("[source.a]\nurl = \"x\"\n", "uri is missing"),
         (
             "[source.a]\nuri = \"tcp://a:1\"\nrate = 5\n",
-            "unknown key `rate`",
+            "line 3: [source.a] unknown key `rate`",
         ),
     ] {
         let (code, said) = ask("check", text);

@@ -2,21 +2,20 @@
 //!
 //! Apart from the opening because a wrong letter in a name is an everyday error, and an error is no place to read folders.
 
+use crate::text;
 use std::io;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 
 /// Files of a folder that are looked at.
 const MOST: usize = 10_000;
-/// Likeness of two names, 1 of equal ones, from which one is meant for the other.
-const ALIKE: f64 = 0.75;
 
 /// The error of opening `path`, with the name that may have been meant.
 pub(crate) fn named(path: &Path, source: io::Error) -> io::Error {
     if source.kind() != io::ErrorKind::NotFound {
         return source;
     }
-    match nearest(path) {
+    match nearest_file(path) {
         None => source,
         Some(near) => {
             let said = Diagnostic::new(source.to_string()).help(format!("there is {near}"));
@@ -25,7 +24,7 @@ pub(crate) fn named(path: &Path, source: io::Error) -> io::Error {
     }
 }
 
-fn nearest(path: &Path) -> Option<String> {
+fn nearest_file(path: &Path) -> Option<String> {
     let wanted = path.file_name()?.to_str()?;
     let folder = path.parent()?;
     let place = match folder.as_os_str().is_empty() {
@@ -34,14 +33,6 @@ fn nearest(path: &Path) -> Option<String> {
     };
     let names = std::fs::read_dir(place).ok()?.take(MOST).flatten();
     let names = names.filter_map(|entry| entry.file_name().into_string().ok());
-    let alike = |name: String| {
-        let likeness = strsim::normalized_damerau_levenshtein(wanted, &name);
-        (likeness >= ALIKE).then_some((likeness, name))
-    };
-    let best = names.filter_map(alike).max_by(|(a, x), (b, y)| {
-        // Of two as near the first by name, whatever the order of the folder.
-        a.total_cmp(b).then_with(|| y.cmp(x))
-    });
-    let (_, name) = best?;
+    let name = text::nearest(wanted, names)?;
     Some(folder.join(name).display().to_string())
 }
