@@ -46,6 +46,7 @@ pub use json::objects::{Object, Objects};
 pub(crate) use refusal::defining;
 pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
+pub use select::names::is_rate_name;
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
 pub(crate) use stamp::{
     OUR_TIME, SHORTEST_STEP, bare as bare_of_text, days_since_1970, decimal_in_steps,

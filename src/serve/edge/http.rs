@@ -40,7 +40,7 @@ pub(crate) fn router() -> Router {
             refusal(
                 StatusCode::NOT_FOUND,
                 "not_found",
-                "there are /, /top, /ws, /samples, /reset, /healthz and /metrics",
+                "there are /, /top, /ws, /samples, /reset, /overview, /model/top, /healthz and /metrics",
             )
         })
 }

@@ -4,9 +4,8 @@
 //! The numbers are those of `strapd model top`. Every one that is asked for is bounded, and so is how
 //! many requests are worked on at once: whoever asks too much hears why.
 
-use super::http::answer::{refusal, response};
+use super::http::answer::{refusal, response, unauthorised};
 use super::http::connection::Connection;
-use crate::sink::UNAUTHORISED;
 use axum::body::Body as Answer;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};
@@ -237,11 +236,7 @@ pub(in crate::serve) async fn answer(
     request: Result<Query<Request>, QueryRejection>,
 ) -> Response<Answer> {
     if connection.hub.token().is_some() && !connection.trusted {
-        return refusal(
-            StatusCode::UNAUTHORIZED,
-            UNAUTHORISED,
-            "Authorization: Bearer TOKEN is needed",
-        );
+        return unauthorised();
     }
     let request = match request {
         Ok(Query(request)) => request,

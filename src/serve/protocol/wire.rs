@@ -6,6 +6,7 @@
 
 mod heading;
 mod packing;
+mod rate_shape;
 mod reference;
 mod resetting;
 
@@ -207,10 +208,14 @@ pub fn read_from(
             ),
         )
         .of(Kind::UnknownClass)),
-        None => heading::bare(line).map(Message::Heading).ok_or_else(|| Fault::new(
-            "no_rate",
-            "the line holds no body rate and no class; expected like {\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}",
-        )),
+        None => heading::bare(line).map(Message::Heading).ok_or_else(|| {
+            let lacks = "the line holds no body rate and no class".to_owned();
+            let what = rate_shape::of_rate(line).unwrap_or(lacks);
+            Fault::new(
+                "no_rate",
+                format!("{what}; expected like {{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{{\"sec\":1,\"nsec\":0}},\"gyro\":[0.1,0,0]}}"),
+            )
+        }),
     }
 }
 

@@ -31,6 +31,7 @@ fn a_bad_line_is_answered_with_its_place_and_the_next_one_counts() {
         ("{\"class\":\"RATE\" \"gyro\":1}", "bad_json", json!(17)),
         ("nonsense\x1b[31m", "bad_json", json!(1)),
         ("{\"a\":1}", "no_rate", Value::Null),
+        ("{\"gyro\":[0,0]}", "no_rate", Value::Null),
         (
             "{\"class\":\"WATCH\",\"rate_hz\":-1}",
             "bad_watch",
@@ -50,7 +51,7 @@ fn a_bad_line_is_answered_with_its_place_and_the_next_one_counts() {
     let att = client.object("ATT");
     assert_eq!(att["seq"], 1);
     assert_eq!(att["status"], json!(["rejected-before", "provisional"]));
-    assert_eq!(source(&daemon, "a", 7)["counts"]["undecodable"], 5);
+    assert_eq!(source(&daemon, "a", 8)["counts"]["undecodable"], 6);
 }
 
 #[test]

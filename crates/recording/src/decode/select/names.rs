@@ -137,6 +137,16 @@ fn temperature(name: &str) -> Option<Meaning> {
     matches!(tail, "" | "c" | "degc" | "celsius").then_some(Meaning::Temperature)
 }
 
+/// Whether a key means a body rate, or one axis of it.
+#[must_use]
+pub fn is_rate_name(key: &str) -> bool {
+    use Meaning::{DeltaAngle, Gyro, GyroAxis};
+    matches!(
+        meaning(key),
+        Some(Gyro { .. } | GyroAxis { .. } | DeltaAngle)
+    )
+}
+
 fn a_names(name: &str) -> Option<Meaning> {
     for (head, rank) in [
         ("angularvelocity", 0),
