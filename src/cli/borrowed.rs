@@ -44,8 +44,11 @@ const BORROWED: [(&str, &[&str], &str); 8] = [
     ),
 ];
 
-/// Adds what helps to an error about an option that there is elsewhere.
+/// Adds what helps to an error about an option that there is elsewhere, or about a recording in the place of a command.
 pub fn explained(mut error: clap::Error) -> clap::Error {
+    if error.kind() == ErrorKind::InvalidSubcommand {
+        return with_commands(error);
+    }
     if error.kind() != ErrorKind::UnknownArgument {
         return error;
     }
@@ -59,6 +62,21 @@ pub fn explained(mut error: clap::Error) -> clap::Error {
         let instead = ContextValue::StyledStrs(vec![(*instead).into()]);
         error.insert(ContextKind::Suggested, instead);
     }
+    error
+}
+
+/// Adds the commands for a file to an error about one that stands where a command is expected.
+fn with_commands(mut error: clap::Error) -> clap::Error {
+    let named = error.get(ContextKind::InvalidSubcommand);
+    let file = named.map(ToString::to_string).unwrap_or_default();
+    if !file.contains(['.', '/']) {
+        return error;
+    }
+    let file = strapd_recording::text::printable(&file);
+    let instead = ["info", "report", "replay"].map(|command| format!("strapd {command} {file}"));
+    error.remove(ContextKind::SuggestedSubcommand);
+    let instead = ContextValue::StyledStrs(vec![instead.join(", or ").into()]);
+    error.insert(ContextKind::Suggested, instead);
     error
 }
 
@@ -98,5 +116,17 @@ mod tests {
                 .unwrap(),
         );
         assert!(!of_another.to_string().contains("listen"));
+    }
+
+    #[test]
+    fn a_recording_in_the_place_of_a_command_is_answered_with_commands() {
+        let said = |word: &str| {
+            explained(Cli::try_parse_from(["strapd", word]).err().unwrap()).to_string()
+        };
+        for file in ["a.mcap", "logs/b", "./c"] {
+            let said = said(file);
+            assert!(said.contains(&format!("strapd report {file}")), "{said}");
+        }
+        assert!(!said("reprot").contains("strapd info reprot"));
     }
 }

@@ -129,6 +129,12 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
     if output.contains("://") && logs == 1 && !is_pattern(output) {
         return Ok(output.to_owned());
     }
+    if let Some(other) = unknown_pattern(output) {
+        let what = format!("-o {output}: {other} stands for nothing");
+        return Err(Error::usage(
+            Diagnostic::new(what).help("{stem} stands for the log's name"),
+        ));
+    }
     if output.ends_with('/') || Path::new(output).is_dir() {
         let dir = output.trim_end_matches('/');
         return Ok(format!("{dir}/{}.attitude.mcap", stem(log)));
@@ -145,6 +151,20 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
         ));
     }
     Ok(output.to_owned())
+}
+
+/// A word in braces that stands for no part of a log's name.
+fn unknown_pattern(output: &str) -> Option<&str> {
+    let mut rest = output;
+    while let Some(at) = rest.find('{') {
+        let opened = rest.get(at..)?;
+        let word = opened.get(..=opened.find('}')?)?;
+        if word != "{stem}" {
+            return Some(word);
+        }
+        rest = opened.get(word.len()..)?;
+    }
+    None
 }
 
 /// A recording as it is printed.
@@ -179,6 +199,11 @@ mod tests {
         assert_eq!(one("out/{stem}.csv", "/d/a.mcap", 2).unwrap(), "out/a.csv");
         assert_eq!(one("out/", "/d/a.mcap", 2).unwrap(), "out/a.attitude.mcap");
         assert_eq!(one("-", "/d/a.mcap", 2).unwrap(), "-");
+        assert_eq!(one("{/a.csv", "a.mcap", 1).unwrap(), "{/a.csv");
+        for wrong in ["out/{stm}.csv", "{stem}/{topic}.csv"] {
+            let error = one(wrong, "a.mcap", 1).unwrap_err().to_string();
+            assert!(error.contains("{stem} stands for"), "{error}");
+        }
         assert_eq!(one("x.mcap", "/d/a.mcap", 1).unwrap(), "x.mcap");
     }
 

@@ -200,6 +200,7 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
 /// With one log, whatever ended it. With several, the rest still run; each failure is said.
 pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
     let is_of_one = args.sources.len() == 1;
+    args.check_values()?;
     args.sources = own_output::without(args.sources, args.estimation.topic.as_deref())?;
     let args = &args;
     let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
@@ -301,6 +302,27 @@ impl Replay {
             true => self.sources.get(..1).unwrap_or_default(),
             false => &self.sources,
         }
+    }
+
+    /// Checks that no source is the value of a flag whose value stands behind `=`.
+    fn check_values(&self) -> Result<()> {
+        let is_address = |text: &str| {
+            let port = text.rsplit(':').next().unwrap_or(text);
+            port.parse::<u16>().is_ok()
+        };
+        let is_topic = |text: &str| text.starts_with('/');
+        for source in self.sources.iter().filter(|name| !Path::new(name).exists()) {
+            let flag = match (&self.serving.page, &self.against_recorded) {
+                (Some(_), _) if is_address(source) => "--page",
+                (_, Some(_)) if is_topic(source) => "--against-recorded",
+                _ => continue,
+            };
+            let what = format!("{source}: no such file");
+            return Err(Error::usage(
+                Diagnostic::new(what).help(format!("{flag}={source}, if it is meant for {flag}")),
+            ));
+        }
+        Ok(())
     }
 
     /// Path for the calibration of a log.

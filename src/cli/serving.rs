@@ -27,7 +27,7 @@ const PAGE: &str = "127.0.0.1:8766";
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Serving (-o tcp-listen://, unix-listen://, ws-listen://)")]
 pub struct Serving {
-    /// Serve at this address as -o ws-listen:// does, at --speed 1 unless said otherwise, and stay
+    /// Serve at this address (or at this port of this machine) as -o ws-listen:// does, at --speed 1 unless said otherwise, and stay
     /// after the end until Ctrl-C. A replay of a file waits at its start for who plays it (not with -o or --loop).
     /// Without --page a run ends at its end
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = PAGE, require_equals = true)]
@@ -88,9 +88,11 @@ impl Serving {
         frames: &FrameNames,
     ) -> Result<Served> {
         if let Some(page) = &self.page {
+            // A port alone is one of this machine.
+            let of_here = if page.parse::<u16>().is_ok() { ":" } else { "" };
             targets.push(Target::Listen(Listen::parse_from(
                 "--page",
-                &format!("ws-listen://{page}"),
+                &format!("ws-listen://{of_here}{page}"),
             )?));
         }
         let speed = match speed {

@@ -251,6 +251,12 @@ fn what_can_not_be_served_is_refused_with_the_way_out() {
             &["--speed 1"],
         ),
         ("--page=nowhere", &["--page ws-listen://nowhere", "known"]),
+        ("--page 8080", &["8080: no such file", "--page=8080"]),
+        (
+            "--against-recorded /imu/data",
+            &["/imu/data: no such file", "--against-recorded=/imu/data"],
+        ),
+        ("-o {stm}.csv", &["{stm} stands for nothing", "{stem}"]),
         (
             "fixtures/ximu3.mcap -o tcp-listen://127.0.0.1:0",
             &["each of the 2 logs"],
