@@ -127,6 +127,6 @@ mod tests {
             let said = said(file);
             assert!(said.contains(&format!("strapd report {file}")), "{said}");
         }
-        assert!(!said("reprot").contains("strapd info reprot"));
+        assert!(!said("replays").contains("strapd info replays"));
     }
 }
