@@ -54,7 +54,13 @@ const ALIKE: f64 = 0.75;
 /// The nearest of `names` to one that is not among them; `None` where none is like it.
 #[must_use]
 pub fn nearest<T: AsRef<str>>(wanted: &str, names: impl Iterator<Item = T>) -> Option<T> {
+    let length = wanted.chars().count();
     let alike = |name: T| {
+        // One that is much longer or shorter is unlike, which saves comparing it letter by letter.
+        let other = name.as_ref().chars().count();
+        if (length.min(other) as f64) < ALIKE * length.max(other) as f64 {
+            return None;
+        }
         let likeness = strsim::normalized_damerau_levenshtein(wanted, name.as_ref());
         (likeness >= ALIKE).then_some((likeness, name))
     };
@@ -89,6 +95,17 @@ pub fn named_few<T: AsRef<str>>(topics: &[T]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_nearest_name_is_found_and_nothing_that_is_unlike() {
+        let names = ["gyro-unit", "gyro-scale", "body", "world"];
+        let of = |wanted: &str| nearest(wanted, names.into_iter());
+        assert_eq!(of("gyro_unit"), Some("gyro-unit"));
+        assert_eq!(of("worlds"), Some("world"));
+        assert_eq!(of("gyro"), None);
+        assert_eq!(of(""), None);
+        assert_eq!(of(&"gyro-unit".repeat(100_000)), None);
+    }
 
     #[test]
     fn a_snippet_is_whole_escaped_characters_of_the_beginning() {
