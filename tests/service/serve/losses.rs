@@ -120,7 +120,7 @@ fn lines_of_the_wrong_shape_are_reported_with_their_column_and_good_ones_are_not
     }
     let said = warnings.recv_timeout(PATIENCE).unwrap();
     assert!(
-        said.starts_with("bad: none of 10 samples is used: the line holds no body rate"),
+        said.starts_with("bad: none of 10 samples is used: `gyro` is a list of 2, not of 3"),
         "{said}"
     );
     assert!(said.contains("line 1, column 13"), "{said}");
