@@ -153,9 +153,13 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
     Ok(output.to_owned())
 }
 
-/// A word in braces that stands for no part of a log's name.
+/// A word in braces that stands for no part of a log's name, in that of a file. A folder may be called so, and addresses
+/// have words of their own.
 fn unknown_pattern(output: &str) -> Option<&str> {
-    let mut rest = output;
+    if output.contains("://") {
+        return None;
+    }
+    let mut rest = output.rsplit('/').next()?;
     while let Some(at) = rest.find('{') {
         let opened = rest.get(at..)?;
         let word = opened.get(..=opened.find('}')?)?;
@@ -199,7 +203,11 @@ mod tests {
         assert_eq!(one("out/{stem}.csv", "/d/a.mcap", 2).unwrap(), "out/a.csv");
         assert_eq!(one("out/", "/d/a.mcap", 2).unwrap(), "out/a.attitude.mcap");
         assert_eq!(one("-", "/d/a.mcap", 2).unwrap(), "-");
-        assert_eq!(one("{/a.csv", "a.mcap", 1).unwrap(), "{/a.csv");
+        for kept in ["{/a.csv", "{mine}/a.csv"] {
+            assert_eq!(one(kept, "a.mcap", 1).unwrap(), kept);
+        }
+        let of_a_broker = one("nats://h/{stem}.{id}", "a.mcap", 2).unwrap();
+        assert_eq!(of_a_broker, "nats://h/a.{id}");
         for wrong in ["out/{stm}.csv", "{stem}/{topic}.csv"] {
             let error = one(wrong, "a.mcap", 1).unwrap_err().to_string();
             assert!(error.contains("{stem} stands for"), "{error}");
