@@ -7,10 +7,13 @@
 //! It looks at samples that wait for their order anyway, so it delays nothing; where none wait (live), [`passed`] judges by
 //! the same rule what has left, and the estimator goes back to the state before it.
 
+mod edges;
 mod force;
 pub(super) mod passed;
+mod past;
 
-use super::gate::{Entry, NO_ACCEL, finite_accel};
+use self::past::Past;
+use super::gate::{Entry, NO_ACCEL};
 use super::repairs::SpikePolicy;
 use super::report::Report;
 use super::settings::Settings;
@@ -43,6 +46,12 @@ const LONGEST: usize = 3;
 const LONGEST_NANOS: i64 = 20_000_000;
 /// Longest step, ns, at which one sample alone can be a spike: at a longer one a flick of the hand is one sample.
 const LONGEST_STEP_NANOS: i64 = 25_000_000;
+/// Longest time, and longest step, ns, of a spike that no body makes while its accelerometer is quiet, and its distance,
+/// rad/s: turned by so much, gravity would be elsewhere.
+const VIOLENT_NANOS: i64 = 60_000_000;
+const VIOLENT: f64 = 20.0;
+/// An increment is no spike up to so many times those beside it: it may cover samples that were lost.
+const LOST: f64 = 4.0;
 /// Steps that a run and its neighbours may take, in times of the ordinary: a burst of stamps passes, a hole does not.
 const LONGEST_SPAN: i64 = 4;
 /// Samples before a run whose steps tell what is ordinary.
@@ -66,6 +75,12 @@ const UNKNOWN_QUANTUM: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(super) struct Spikes {
     past: Past,
+    /// Samples that wait behind one, at least.
+    waits: usize,
+    /// Values are increments, and not rates.
+    is_increment: bool,
+    /// Value of 1 rad/s.
+    unit: f64,
     /// The rest of a run that is being replaced: place in the stream, and the line's value.
     run: [Option<(u64, Vector3<f64>)>; LONGEST - 1],
     drops_force: bool,
@@ -75,7 +90,17 @@ pub(super) struct Spikes {
 
 /// Samples that a spike has at most.
 fn most(spacing: i64) -> usize {
-    (LONGEST_NANOS / spacing).clamp(1, LONGEST as i64) as usize
+    (VIOLENT_NANOS / spacing).clamp(1, LONGEST as i64) as usize
+}
+
+/// Whether so many samples take longer than a spike does of which only the distance tells.
+fn is_long(samples: usize, spacing: i64) -> bool {
+    let longest = if samples == 1 {
+        LONGEST_STEP_NANOS
+    } else {
+        LONGEST_NANOS
+    };
+    samples as i64 * spacing > longest
 }
 
 /// Whether a run of so many samples, and the one behind, have no hole in them.
@@ -86,23 +111,6 @@ fn is_whole(span: i64, samples: usize, spacing: i64, coarse: Option<i64>) -> boo
 
 fn is_rate(settings: &Settings) -> bool {
     matches!(settings.kind, SampleKind::Rate | SampleKind::Average)
-}
-
-/// The last samples, as far as the rule needs them.
-#[derive(Clone, Debug)]
-struct Past {
-    /// The last two rates, newest first.
-    rates: [Vector3<f64>; 2],
-    /// Specific forces before the next sample, newest first; the last one that came stands in for none.
-    forces: [Option<Vector3<f64>>; LONGEST + 2],
-    /// Squares of the largest change of the rate, and of the step of the force, at each of the last samples but the
-    /// newest.
-    changes: [(f64, f64); PAST],
-    at: usize,
-    count: usize,
-    last: Nanos,
-    /// Smallest change of one component so far, rad/s.
-    quantum: f64,
 }
 
 /// A run of samples against its neighbours.
@@ -120,6 +128,10 @@ struct Weight {
     ratio: f64,
     /// One sample only.
     is_alone: bool,
+    /// So long that it may be motion.
+    is_long: bool,
+    /// So far off that with a quiet force it is none.
+    is_violent: bool,
     /// The accelerometer felt nothing about it.
     is_quiet: bool,
     is_above_quanta: bool,
@@ -131,20 +143,15 @@ impl Spikes {
     /// The stage that `settings` ask for.
     pub(super) fn of(settings: &Settings) -> Option<Spikes> {
         let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window > LONGEST;
-        (is_on && is_rate(settings)).then(Spikes::new)
+        is_on.then(|| Spikes::new(settings.reorder_window, !is_rate(settings)))
     }
 
-    fn new() -> Spikes {
+    fn new(waits: usize, is_increment: bool) -> Spikes {
         Spikes {
-            past: Past {
-                rates: [Vector3::zeros(); 2],
-                forces: [None; LONGEST + 2],
-                changes: [(0.0, 0.0); PAST],
-                at: 0,
-                count: 0,
-                last: Nanos(0),
-                quantum: f64::INFINITY,
-            },
+            waits,
+            is_increment,
+            unit: 1.0,
+            past: Past::new(),
             run: [None; LONGEST - 1],
             drops_force: false,
             wrong_forces: (0, 0.0),
@@ -174,7 +181,7 @@ impl Spikes {
         self.past.push(entry, &value);
         report
             .spikes
-            .add(entry.stamp, 1, (entry.value - value).norm());
+            .add(entry.stamp, 1, (entry.value - value).norm() / self.unit);
         let status = Status(entry.status.0 & !Status::SATURATED.0);
         Some(Entry {
             value,
@@ -200,8 +207,7 @@ impl Spikes {
             return None;
         }
         if self.wrong_forces.0 == 0 {
-            let spacing = spacing.filter(|step| (1..=LONGEST_STEP_NANOS).contains(step))?;
-            let (samples, off) = self.wrong_forces(entry, ahead, spacing, coarse)?;
+            let (samples, off) = self.wrong_forces(entry, ahead, spacing?, coarse)?;
             self.wrong_forces = (samples, off);
             report.force_spikes.add(entry.stamp, samples, off);
         }
@@ -219,12 +225,13 @@ impl Spikes {
         spacing: i64,
         coarse: Option<i64>,
     ) -> Option<(usize, f64)> {
-        if self.past.count <= PAST {
+        if self.past.count <= PAST || !(1..=LONGEST_STEP_NANOS).contains(&spacing) {
             return None;
         }
-        (1..=most(spacing)).find_map(|samples| {
+        let mut samples = (1..=most(spacing)).take_while(|samples| !is_long(*samples, spacing));
+        samples.find_map(|samples| {
             let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
-            let off = self.past.force_off(entry, ahead, samples)?;
+            let off = self.past.force_off(entry, ahead, samples, self.unit)?;
             is_whole(span, samples, spacing, coarse).then_some((samples, off))
         })
     }
@@ -243,14 +250,22 @@ impl Spikes {
                 return Some(value);
             }
         }
-        let spacing = spacing.filter(|step| (1..=LONGEST_STEP_NANOS).contains(step))?;
-        if self.past.count <= PAST {
-            return None;
+        let spacing = spacing.filter(|step| (1..=VIOLENT_NANOS).contains(step))?;
+        if self.is_increment {
+            self.unit = spacing as f64 * 1e-9;
+        }
+        let is_beginning = self.past.count <= PAST || self.past.is_hole(entry, spacing, coarse);
+        if is_beginning || ahead.len() < LONGEST {
+            let run = self.at_edge(entry, ahead, (spacing, coarse), is_beginning);
+            if run.is_some() || is_beginning {
+                return run.map(|(run, drops_force)| self.begin(&run, drops_force, ahead));
+            }
         }
         (1..=most(spacing)).find_map(|samples| {
             let run = self.run_of(entry, ahead, samples, spacing, coarse)?;
-            let weight = self.weight(&run, entry, ahead);
-            weight.is_spike().then(|| self.begin(&run, &weight, ahead))
+            let weight = self.weight(&run, entry, ahead, (spacing, self.past.ordinary()));
+            let is_spike = weight.is_spike();
+            is_spike.then(|| self.begin(&run, weight.drops_force, ahead))
         })
     }
 
@@ -264,15 +279,24 @@ impl Spikes {
         spacing: i64,
         coarse: Option<i64>,
     ) -> Option<Run> {
-        let run = Run::of(&self.past.rates[0], entry, ahead, samples)?;
+        let run = Run::of(&self.past.rates[0], entry, ahead, samples, self.unit)?;
+        let within = || std::iter::once(entry).chain(ahead).take(samples);
+        if self.is_increment && !within().all(|sample| run.is_beyond_lost(&sample.value)) {
+            return None;
+        }
         let span = ahead.get(samples - 1)?.stamp.since(self.past.last);
         is_whole(span, samples, spacing, coarse).then_some(run)
     }
 
-    /// Evidence for a spike, by the samples in `ahead`.
+    /// Evidence for a spike, by the samples in `ahead`, their step, and the changes of rate and force that are ordinary.
     #[cold]
-    fn weight(&self, run: &Run, entry: &Entry, ahead: &[Entry]) -> Weight {
-        let (rate, force) = self.past.ordinary();
+    fn weight(
+        &self,
+        run: &Run,
+        entry: &Entry,
+        ahead: &[Entry],
+        (spacing, (rate, force)): (i64, (f64, f64)),
+    ) -> Weight {
         let ends_apart = (run.ends.1 - run.ends.0).norm();
         let is_quiet = |step: f64| step < 2.0 * force + QUIET_FORCE;
         let step = |behind| {
@@ -280,12 +304,14 @@ impl Spikes {
                 .force_step(entry, ahead, run.samples + behind, run.samples)
         };
         Weight {
-            ratio: run.distance / (ends_apart + rate + FLOOR),
+            ratio: run.distance / (ends_apart + rate + FLOOR * self.unit),
             is_alone: run.samples == 1,
+            is_long: is_long(run.samples, spacing),
+            is_violent: run.distance > VIOLENT * self.unit,
             is_quiet: step(2).is_some_and(is_quiet),
             is_above_quanta: match self.past.quantum.is_finite() {
                 true => run.distance > QUANTA * self.past.quantum,
-                false => run.distance > UNKNOWN_QUANTUM,
+                false => run.distance > UNKNOWN_QUANTUM * self.unit,
             },
             drops_force: step(1).is_some_and(|step| !is_quiet(step)),
         }
@@ -293,8 +319,8 @@ impl Spikes {
 
     /// The value of the first sample of `run`, which is a spike; the others are noted.
     #[cold]
-    fn begin(&mut self, run: &Run, weight: &Weight, ahead: &[Entry]) -> Vector3<f64> {
-        self.drops_force = weight.drops_force;
+    fn begin(&mut self, run: &Run, drops_force: bool, ahead: &[Entry]) -> Vector3<f64> {
+        self.drops_force = drops_force;
         for (n, slot) in self.run.iter_mut().enumerate() {
             *slot = ahead
                 .get(n)
@@ -308,18 +334,26 @@ impl Spikes {
 impl Weight {
     /// Whether it is one whatever the accelerometer says.
     fn is_certain(&self) -> bool {
-        self.is_alone && self.ratio > ANY && self.is_above_quanta
+        self.is_alone && !self.is_long && self.ratio > ANY && self.is_above_quanta
     }
 
     fn is_spike(&self) -> bool {
-        self.is_certain() || (self.ratio > QUIET && self.is_quiet && self.is_above_quanta)
+        let is_short = !self.is_long || self.is_violent;
+        let is_quiet = self.ratio > QUIET && self.is_quiet && self.is_above_quanta;
+        self.is_certain() || (is_quiet && is_short)
     }
 }
 
 impl Run {
-    /// The run of so many samples that begins at `entry`, where it can be a spike at all.
+    /// The run of so many samples that begins at `entry`, where it can be a spike at all; `unit` is the value of 1 rad/s.
     #[inline]
-    fn of(before: &Vector3<f64>, entry: &Entry, ahead: &[Entry], samples: usize) -> Option<Run> {
+    fn of(
+        before: &Vector3<f64>,
+        entry: &Entry,
+        ahead: &[Entry],
+        samples: usize,
+        unit: f64,
+    ) -> Option<Run> {
         let behind = ahead.get(samples - 1)?;
         if behind.epoch != entry.epoch {
             return None;
@@ -330,13 +364,14 @@ impl Run {
             distance: f64::INFINITY,
         };
         let apart = (run.ends.1 - run.ends.0).norm_squared();
+        let floor = FLOOR * unit;
         let within = std::iter::once(entry).chain(ahead).take(samples);
         let mut off = [Vector3::zeros(); LONGEST];
         for (n, (off, sample)) in off.iter_mut().zip(within).enumerate() {
             *off = sample.value - run.line(n);
             let size = off.norm_squared();
             // The cheap half of the rule: nearly every sample leaves here.
-            if size <= QUIET * QUIET * (apart + FLOOR * FLOOR) {
+            if size <= QUIET * QUIET * (apart + floor * floor) {
                 return None;
             }
             run.distance = run.distance.min(size);
@@ -350,80 +385,18 @@ impl Run {
         is_on_one_side.then_some(run)
     }
 
+    /// Whether an increment is more than those beside it with some that were lost.
+    fn is_beyond_lost(&self, increment: &Vector3<f64>) -> bool {
+        let (before, behind) = &self.ends;
+        increment.norm() > LOST * before.norm().max(behind.norm())
+    }
+
     /// The line between the neighbours at the `n`th sample.
     #[inline]
     fn line(&self, n: usize) -> Vector3<f64> {
         let (before, behind) = &self.ends;
         let share = (n + 1) as f64 / (self.samples + 1) as f64;
         before + (behind - before) * share
-    }
-}
-
-impl Past {
-    /// Adds a sample with this rate, which may be the repaired one.
-    #[inline]
-    fn push(&mut self, entry: &Entry, rate: &Vector3<f64>) {
-        let [newest, older] = self.rates;
-        let step = (newest - older).norm_squared();
-        let bend = (newest - (older + rate) * 0.5).norm_squared();
-        let force = match self.forces {
-            [Some(newest), Some(older), ..] => (newest - older).norm_squared(),
-            _ => 0.0,
-        };
-        // The first two have no predecessors to differ from.
-        if self.count >= 2
-            && let Some(slot) = self.changes.get_mut(self.at)
-        {
-            *slot = (step.max(bend), force);
-            self.at = (self.at + 1) % PAST;
-        }
-        for (now, before) in rate.iter().zip(&newest) {
-            let change = (now - before).abs();
-            if self.count > 0 && change > 0.0 && change < self.quantum {
-                self.quantum = change;
-            }
-        }
-        self.rates = [*rate, newest];
-        let force = finite_accel(&entry.accel).or(self.forces[0]);
-        self.forces.rotate_right(1);
-        self.forces[0] = force;
-        self.count = self.count.saturating_add(1);
-        self.last = entry.stamp;
-    }
-
-    /// The largest change of the rate and of the force in the samples before the newest.
-    fn ordinary(&self) -> (f64, f64) {
-        let largest = self
-            .changes
-            .iter()
-            .fold((0.0_f64, 0.0_f64), |most, change| {
-                (most.0.max(change.0), most.1.max(change.1))
-            });
-        (largest.0.sqrt(), largest.1.sqrt())
-    }
-
-    /// The largest step of the force from as many samples before the run as are in it to the `count`th from its first;
-    /// `None` without forces.
-    fn force_step(
-        &self,
-        entry: &Entry,
-        ahead: &[Entry],
-        count: usize,
-        samples: usize,
-    ) -> Option<f64> {
-        let before = self.forces.get(..=samples)?.iter().rev();
-        let mut last = (*before.clone().next()?)?;
-        let mut largest = 0.0_f64;
-        let following = std::iter::once(entry).chain(ahead).take(count);
-        let forces = before
-            .skip(1)
-            .copied()
-            .chain(following.map(|sample| finite_accel(&sample.accel)));
-        for force in forces.flatten() {
-            largest = largest.max((force - last).norm());
-            last = force;
-        }
-        Some(largest)
     }
 }
 

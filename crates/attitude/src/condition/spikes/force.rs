@@ -36,9 +36,15 @@ impl Past {
     }
 
     /// Distance of the forces of the `samples` from `entry` on off the line between their neighbours, m/s^2, where they
-    /// are a glitch.
+    /// are a glitch; `unit` is the value of 1 rad/s.
     #[cold]
-    pub(super) fn force_off(&self, entry: &Entry, ahead: &[Entry], samples: usize) -> Option<f64> {
+    pub(super) fn force_off(
+        &self,
+        entry: &Entry,
+        ahead: &[Entry],
+        samples: usize,
+        unit: f64,
+    ) -> Option<f64> {
         let behind = ahead.get(samples - 1)?;
         if behind.epoch != entry.epoch {
             return None;
@@ -61,7 +67,7 @@ impl Past {
         let sum = off.iter().sum::<Vector3<f64>>();
         let distance = off.iter().map(Vector3::norm).fold(f64::INFINITY, f64::min);
         let (rate, force) = self.ordinary();
-        let is_felt = bend > 2.0 * rate + QUIET_RATE;
+        let is_felt = bend > 2.0 * rate + QUIET_RATE * unit;
         let is_alone = distance > LEAST
             && distance > ALONE_FORCE * (apart(&forces) + force + QUIET_FORCE)
             && off.iter().all(|off| off.dot(&sum) > 0.0);

@@ -8,11 +8,16 @@
 use super::super::gate::{Entry, NO_ACCEL};
 use super::super::report::Report;
 use super::super::timing::Timing;
-use super::{FLOOR, LONGEST, LONGEST_STEP_NANOS, PAST, QUIET, Run, Spikes, is_rate, most};
+use super::edges::AHEAD;
+use super::{
+    FLOOR, LONGEST, LONGEST_STEP_NANOS, PAST, QUIET, Run, Spikes, VIOLENT_NANOS, is_rate, most,
+};
 use crate::condition::{Settings, SpikePolicy};
 use crate::record::{RateSample, Status};
 
-/// Samples that wait for a judgement at most: a run, and the two behind it by which it is judged.
+/// Step of the rate, rad/s, at which one of the first samples may be a spike.
+const BEGINS: f64 = 0.5;
+/// Samples that wait for a judgement at most, but for the first ones: a run, and the two behind it by which it is judged.
 const MOST: usize = LONGEST + 2;
 
 /// Judgement of samples that have left.
@@ -61,7 +66,7 @@ impl Passed {
     pub(in crate::condition) fn of(settings: &Settings) -> Option<Passed> {
         let is_on = settings.spikes == SpikePolicy::Repair && settings.reorder_window == 0;
         (is_on && is_rate(settings)).then(|| Passed {
-            spikes: Spikes::new(),
+            spikes: Spikes::new(AHEAD, false),
             waiting: Vec::new(),
             revisions: None,
         })
@@ -91,28 +96,40 @@ impl Passed {
         timing: &Timing,
         report: &mut Report,
     ) {
-        if self.waiting.is_empty() && !self.is_suspect(entry, timing.spacing()) {
+        let steps = (timing.spacing(), timing.coarse());
+        if self.waiting.is_empty() && !self.is_suspect(entry, steps) {
             self.spikes.past.push(entry, &entry.value);
             return;
         }
         self.doubt(entry, sample, place, timing, report);
     }
 
-    /// Whether a spike can begin at this entry.
+    /// Whether a spike can begin at this entry, where a step, and the clock's if that is longer, are such.
     #[inline]
-    fn is_suspect(&self, entry: &Entry, spacing: Option<i64>) -> bool {
+    fn is_suspect(&self, entry: &Entry, (spacing, coarse): (Option<i64>, Option<i64>)) -> bool {
         let past = &self.spikes.past;
         let step = (entry.value - past.rates[0]).norm_squared();
         let may_be_force = past.may_be_force(entry);
-        if (step <= QUIET * QUIET * FLOOR * FLOOR && !may_be_force) || past.count <= PAST {
+        if step <= QUIET * QUIET * FLOOR * FLOOR && !may_be_force {
             return false;
         }
-        let has_step = spacing.is_some_and(|step| (1..=LONGEST_STEP_NANOS).contains(&step));
-        if may_be_force {
-            return has_step;
-        }
+        let has_step = |most: i64| spacing.is_some_and(|step| (1..=most).contains(&step));
         let ordinary = QUIET * (past.ordinary().0 + FLOOR);
-        has_step && step > ordinary * ordinary
+        if self.is_beginning(entry, (spacing, coarse)) {
+            let may_be = spacing.is_none() || has_step(VIOLENT_NANOS);
+            return may_be && step > (ordinary * ordinary).max(BEGINS * BEGINS);
+        }
+        if may_be_force && has_step(LONGEST_STEP_NANOS) {
+            return true;
+        }
+        has_step(VIOLENT_NANOS) && step > ordinary * ordinary
+    }
+
+    /// Whether what is ordinary is told by what follows.
+    #[inline]
+    fn is_beginning(&self, entry: &Entry, (spacing, coarse): (Option<i64>, Option<i64>)) -> bool {
+        let past = &self.spikes.past;
+        past.count <= PAST || spacing.is_some_and(|spacing| past.is_hole(entry, spacing, coarse))
     }
 
     #[cold]
@@ -136,7 +153,7 @@ impl Passed {
             if behind.is_empty() && !is_new {
                 note(&mut self.revisions, Revision::Over);
                 is_new = true;
-                if !self.is_suspect(&first, timing.spacing()) {
+                if !self.is_suspect(&first, (timing.spacing(), timing.coarse())) {
                     self.spikes.past.push(&first, &first.value);
                     self.waiting.clear();
                     return;
@@ -173,10 +190,14 @@ impl Passed {
 
     /// Judges the oldest sample by those behind it.
     fn judgement(&self, first: &Entry, timing: &Timing) -> Judgement {
-        let spacing = timing
-            .spacing()
-            .filter(|_| self.is_suspect(first, timing.spacing()));
-        let Some(spacing) = spacing else {
+        let steps = (timing.spacing(), timing.coarse());
+        if !self.is_suspect(first, steps) {
+            return Judgement::Sound;
+        }
+        if self.is_beginning(first, steps) {
+            return self.judgement_of_beginning(first, steps);
+        }
+        let Some(spacing) = timing.spacing() else {
             return Judgement::Sound;
         };
         let mut ahead = [*first; MOST];
@@ -195,7 +216,8 @@ impl Passed {
             let Some(run) = run else {
                 continue;
             };
-            let weight = self.spikes.weight(&run, first, ahead);
+            let ordinary = (spacing, self.spikes.past.ordinary());
+            let weight = self.spikes.weight(&run, first, ahead, ordinary);
             // Until it has come, the force behind may still tell of a blow.
             if weight.is_spike() && !weight.is_certain() && ahead.len() <= samples {
                 return Judgement::Open;
@@ -207,6 +229,28 @@ impl Passed {
         let coarse = timing.coarse();
         match self.spikes.wrong_forces(first, ahead, spacing, coarse) {
             Some((samples, off)) => Judgement::WrongForces(samples, off),
+            None => Judgement::Sound,
+        }
+    }
+
+    /// Judges the oldest sample, one of the first, once as many have come as a recording has waiting.
+    fn judgement_of_beginning(
+        &self,
+        first: &Entry,
+        (spacing, coarse): (Option<i64>, Option<i64>),
+    ) -> Judgement {
+        let behind = self.waiting.get(1..).unwrap_or_default();
+        if behind.len() < AHEAD {
+            return Judgement::Open;
+        }
+        let ahead: Vec<Entry> = behind.iter().map(|(entry, _)| *entry).collect();
+        let spacing = spacing.filter(|step| (1..=VIOLENT_NANOS).contains(step));
+        let run = spacing.and_then(|spacing| {
+            let steps = (spacing, coarse);
+            self.spikes.at_edge(first, &ahead, steps, true)
+        });
+        match run {
+            Some((run, drops_force)) => Judgement::Spike(run, drops_force),
             None => Judgement::Sound,
         }
     }

@@ -233,10 +233,6 @@ fn spikes_are_the_same_however_samples_come_and_left_where_that_is_asked_or_noth
             reorder_window: Settings::LIVE_WINDOW,
             ..Settings::default()
         },
-        Settings {
-            kind: SampleKind::DeltaAngle,
-            ..Settings::default()
-        },
     ] {
         assert_eq!(of(&settings, 10).1.spikes.samples, 0, "{settings:?}");
     }
@@ -267,4 +263,155 @@ fn coarse_and_slow_rates_hold_no_spikes() {
             .samples,
         0
     );
+}
+
+#[test]
+fn the_first_samples_of_a_sensor_that_has_not_measured_yet_are_replaced() {
+    let clean = hand(10, 200);
+    let wrong = [
+        [12.2, 16.3, -16.0],
+        [11.5, -12.2, -13.0],
+        [12.2, -16.0, 0.0],
+    ];
+    for (from, length) in [(0, 1), (0, 2), (0, 3), (1, 1), (7, 2), (16, 3)] {
+        let mut raw = clean.clone();
+        for (sample, wrong) in raw.iter_mut().skip(from).zip(wrong).take(length) {
+            sample.gyro = Some(if from == 0 { wrong } else { [12.0, 0.0, 9.0] });
+        }
+        let places: Vec<usize> = (from..from + length).collect();
+        for piece in [1, 33, raw.len()] {
+            let (out, report) = conditioned(&Settings::default(), &raw, piece);
+            assert_eq!(repaired(&out), places, "{from} {length} in {piece}");
+            assert_eq!(report.spikes.first, raw[from].header);
+            let off = |n: &usize| (rate(&out[*n]) - Vector3::from(clean[*n].gyro.unwrap())).norm();
+            assert!(places.iter().all(|n| off(n) < 0.01));
+        }
+    }
+    // The same behind a hole of a second, in motion.
+    let mut raw = clean;
+    raw.drain(1200..1400);
+    for (sample, wrong) in raw.iter_mut().skip(1200).zip(wrong) {
+        sample.gyro = Some(wrong);
+    }
+    let (out, _) = conditioned(&Settings::default(), &raw, 50);
+    assert_eq!(repaired(&out), [1200, 1201, 1202]);
+}
+
+#[test]
+fn a_stream_that_begins_in_motion_or_with_a_blow_keeps_its_first_samples() {
+    let none = |raw: &[RawSample], why: &str| {
+        let (out, report) = conditioned(&Settings::default(), raw, 64);
+        assert_eq!(report.spikes.samples, 0, "{why}");
+        assert!(repaired(&out).is_empty(), "{why}");
+    };
+    let moving = hand(10, 100).split_off(420);
+    none(&moving, "motion");
+    // A driver's zeros, and a table that was switched on: less than what follows.
+    for length in 1..=3 {
+        let mut zeros = hand(10, 100);
+        for (n, sample) in zeros.iter_mut().enumerate() {
+            sample.gyro = Some([0.0, 0.0, if n < length { 0.01 } else { 3.0 }]);
+        }
+        none(&zeros, "a step");
+    }
+    let mut blow = hand(10, 400);
+    for (n, sample) in blow.iter_mut().take(2).enumerate() {
+        add(sample, 0, 9.0);
+        sample.accel = Some([30.0, 9.0 * n as f64, -20.0]);
+    }
+    none(&blow, "a blow");
+    // Slow sensors, and too few samples to tell.
+    let mut slow = hand(30, 20);
+    add(&mut slow[0], 0, 9.0);
+    none(&slow, "slow");
+    let mut short = hand(1, 200);
+    add(&mut short[0], 0, 9.0);
+    short.truncate(9);
+    none(&short, "short");
+}
+
+#[test]
+fn the_last_samples_are_replaced_where_no_body_can_have_moved_so() {
+    let clean = hand(10, 200);
+    for length in 1..=3 {
+        let mut raw = clean.clone();
+        let from = raw.len() - length;
+        for (n, sample) in raw.iter_mut().skip(from).enumerate() {
+            sample.gyro = Some([-17.0, 9.0 + n as f64, 20.0]);
+        }
+        let places: Vec<usize> = (from..from + length).collect();
+        for piece in [1, 33, raw.len()] {
+            let (out, report) = conditioned(&Settings::default(), &raw, piece);
+            assert_eq!(repaired(&out), places, "{length} in {piece}");
+            assert_eq!(report.spikes.samples, length as u64);
+        }
+        // Who takes it up at the end turns it less, and is felt.
+        for (rate, force) in [(4.0, 0.0), (17.0, 9.0)] {
+            let mut taken = clean.clone();
+            for (n, sample) in taken.iter_mut().skip(from).enumerate() {
+                add(sample, 0, rate * (n + 1) as f64);
+                sample.accel = sample.accel.map(|[x, y, z]| [x + force, y, z]);
+            }
+            taken.truncate(from + if rate < 5.0 { 1 } else { length });
+            let (_, report) = conditioned(&Settings::default(), &taken, 64);
+            assert_eq!(report.spikes.samples, 0, "{length} {rate}");
+        }
+    }
+}
+
+#[test]
+fn a_violent_spike_is_found_where_it_takes_longer_and_a_flick_is_none() {
+    for (hz, length) in [(50, 2), (50, 3), (20, 1)] {
+        let clean = hand(40, hz);
+        let mut raw = clean.clone();
+        let places: Vec<usize> = (hz * 20..hz * 20 + length).collect();
+        for n in &places {
+            add(&mut raw[*n], 1, 40.0);
+        }
+        let (out, _) = conditioned(&Settings::default(), &raw, 64);
+        assert_eq!(repaired(&out), places, "{hz} Hz");
+        // What is felt, and what a hand may do, is kept.
+        let mut felt = clean.clone();
+        for (k, n) in places.iter().enumerate() {
+            add(&mut felt[*n], 1, 40.0);
+            felt[*n].accel = Some([15.0, 4.0 * k as f64, -9.0]);
+        }
+        let mut flick = clean;
+        for n in &places {
+            add(&mut flick[*n], 1, 12.0);
+        }
+        for raw in [&felt, &flick] {
+            let (_, report) = conditioned(&Settings::default(), raw, 64);
+            assert_eq!(report.spikes.samples, 0, "{hz} Hz");
+        }
+    }
+}
+
+#[test]
+fn spikes_of_increments_are_found_and_one_that_covers_lost_samples_is_none() {
+    let settings = Settings {
+        kind: SampleKind::DeltaAngle,
+        ..Settings::default()
+    };
+    let mut clean = hand(40, 100);
+    for sample in &mut clean {
+        sample.gyro = sample.gyro.map(|rate| rate.map(|rate| rate / 100.0));
+    }
+    let mut raw = clean.clone();
+    let spikes = [700, 1500, 1501, 3999];
+    for n in spikes {
+        add(&mut raw[n], 2, 0.4);
+    }
+    let (out, report) = conditioned(&settings, &raw, 64);
+    assert_eq!(repaired(&out), spikes);
+    assert!((report.spikes.largest - 40.0).abs() < 0.2, "{report:?}");
+    // A table that turns at 3 rad/s, whose driver missed three readings and summed.
+    let mut table = hand(20, 100);
+    for (n, sample) in table.iter_mut().enumerate() {
+        let times = if n % 300 == 299 { 4.0 } else { 1.0 };
+        sample.gyro = Some([0.0, 0.0, 0.03 * times]);
+    }
+    for raw in [&clean, &table] {
+        assert_eq!(conditioned(&settings, raw, 64).1.spikes.samples, 0);
+    }
 }

@@ -338,3 +338,39 @@ fn a_smoother_has_the_same_bits_however_much_comes_at_once() {
         assert!(of(piece) == expected, "in pieces of {piece}");
     }
 }
+
+#[test]
+fn wrong_first_samples_are_taken_back_once_those_behind_have_come() {
+    let clean = hand(8, HZ);
+    let mut first = clean.clone();
+    let wrong = [[12.2, 16.3, -16.0], [11.5, -12.2, -13.0]];
+    for (sample, wrong) in first.iter_mut().zip(wrong) {
+        sample.gyro = Some(wrong);
+    }
+    // Amid the first ones, between neighbours.
+    let mut tenth = clean.clone();
+    add(&mut tenth[9], 1, -30.0);
+    for (raw, at, count) in [(first, 0, 2), (tenth, 9, 1)] {
+        let repaired = repaired(&raw);
+        for aid in [Aid::None, Aid::Gravity] {
+            let of = |raw: &[RawSample], spikes| run(&plan(aid, SampleKind::Rate, spikes), raw);
+            let (expected, _) = of(&repaired, SpikePolicy::Keep);
+            let (kept, _) = of(&raw, SpikePolicy::Keep);
+            let (found, estimator) = of(&raw, SpikePolicy::Repair);
+            let report = estimator.conditioning();
+            let counts = (report.spikes.samples, report.spikes_left.samples);
+            assert_eq!(counts, (count, 0), "{aid:?} {at}");
+            // It has sixteen behind it then.
+            for n in at + 17..raw.len() {
+                let off = apart(&found[n], &expected[n]);
+                assert!(off < 1e-9, "{aid:?} {at}: {off} rad at {n}");
+            }
+            assert!(apart(&kept[60], &expected[60]) > 0.01);
+        }
+    }
+    // Who begins in motion is doubted, and keeps every bit.
+    let moving = clean.get(4 * HZ..).unwrap();
+    let of = |spikes| run(&plan(Aid::Gravity, SampleKind::Rate, spikes), moving).0;
+    let (found, kept) = (of(SpikePolicy::Repair), of(SpikePolicy::Keep));
+    assert!(found.iter().zip(&kept).all(|(a, b)| a.q_nb == b.q_nb));
+}
