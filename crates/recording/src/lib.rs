@@ -59,6 +59,7 @@ pub mod attitude_line;
 mod bag;
 mod columns;
 mod dataflash;
+mod decimal;
 pub mod decode;
 pub mod delimited;
 pub mod devices;

@@ -9,6 +9,7 @@ use super::own;
 use super::preamble;
 use crate::columns::{Columns, bits};
 use crate::columns::{Delimiter, RowSelection};
+use crate::decimal;
 use crate::decode::{Class, Line, MAX_LINE, Undecodable, exact_name};
 use crate::text::without_mark;
 use crate::text::{printable, snippet};
@@ -275,8 +276,7 @@ impl Table {
         self.columns.iter().any(|(known, _)| *known == Some(column))
     }
 
-    /// Reads one row, without or with its line end, and pushes its sample. The first row once more, as where tables
-    /// were
+    /// Reads one row, without or with its line end, and pushes its sample. The first row once more, as where tables were
     /// put one behind the other, is no row, and neither is a comment; what stands under another first row is not of
     /// this table. A row without `log_ns` was received at its stamp.
     ///
@@ -591,6 +591,12 @@ impl Read {
                 return Ok(());
             }
             return self.take(column, &bits::spelled(cell), commas, clock);
+        }
+        if let Some(value) = decimal::alone(cell)
+            && let Some(place) = self.place_of(column)
+        {
+            *place = Some(value);
+            return Ok(());
         }
         let mut pointed = [0; MOST_DIGITS];
         let cell = match commas && cell.contains(&b',') {

@@ -5,6 +5,7 @@
 //! with serde_json. Beyond RFC 8259 it takes the `NaN`, `Infinity` and `-Infinity` that Python
 //! writes: such a sample is then counted as not finite, not as undecodable.
 
+use crate::decimal;
 use crate::decode::Undecodable;
 use std::borrow::Cow;
 
@@ -218,7 +219,7 @@ impl<'a> Scanner<'a> {
     pub(crate) fn float(&mut self) -> Scan<Option<f64>> {
         self.peek();
         if let Some((value, len)) =
-            short_float(self.text.as_bytes().get(self.pos..).unwrap_or_default())
+            decimal::short(self.text.as_bytes().get(self.pos..).unwrap_or_default())
         {
             self.pos += len;
             return Ok(Some(value));
@@ -321,44 +322,6 @@ impl<'a> Scanner<'a> {
     }
 }
 
-/// Most digits that an integer of 53 bits holds, whatever they are.
-const EXACT_DIGITS: usize = 15;
-/// Powers of ten up to [`EXACT_DIGITS`], each exact.
-const TENS: [f64; EXACT_DIGITS + 1] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
-];
-
-/// Value and length of a decimal of few digits without an exponent, in one pass: its digits and the power of ten under
-/// them are exact, so that their quotient is correctly rounded (Clinger 1990). `None` for every other text.
-#[inline]
-fn short_float(text: &[u8]) -> Option<(f64, usize)> {
-    let is_negative = text.first() == Some(&b'-');
-    let start = usize::from(is_negative);
-    let (mut pos, mut digits, mut point) = (start, 0_u64, None);
-    let end = loop {
-        match *text.get(pos)? {
-            digit @ b'0'..=b'9' => digits = digits * 10 + u64::from(digit - b'0'),
-            b'.' if point.is_none() && pos > start => point = Some(pos),
-            b',' | b']' | b'}' | b' ' | b'\t' | b'\r' | b'\n' => break pos,
-            _ => return None,
-        }
-        pos += 1;
-        if pos > start + EXACT_DIGITS + 1 {
-            return None;
-        }
-    };
-    let decimals = point.map_or(0, |point| end - point - 1);
-    let whole = point.unwrap_or(end) - start;
-    // `.5`, `5.` and `05` are no JSON, and more digits are not exact.
-    let has_leading_zero = whole > 1 && text.get(start) == Some(&b'0');
-    let is_exact = whole + decimals <= EXACT_DIGITS;
-    if whole == 0 || has_leading_zero || (point.is_some() && decimals == 0) || !is_exact {
-        return None;
-    }
-    let value = digits as f64 / TENS.get(decimals)?;
-    Some((if is_negative { -value } else { value }, end))
-}
-
 /// A string's text without its escapes, which have been checked.
 fn unescape(raw: &str) -> String {
     let mut out = String::with_capacity(raw.len());
@@ -443,20 +406,7 @@ mod tests {
             let read = scanner.float().unwrap().unwrap();
             prop_assert_eq!(read.to_bits(), wanted.to_bits());
             prop_assert_eq!(scanner.position(), text.len());
-            let digits = text.bytes().filter(u8::is_ascii_digit).count();
-            prop_assert_eq!(short_float(whole.as_bytes()).is_some(), digits <= EXACT_DIGITS);
         }
-    }
-
-    #[test]
-    fn what_only_looks_like_a_short_decimal_is_none() {
-        for text in [
-            "-,", ".5,", "5.,", "05,", "-00.5]", "1.2.3,", "1e5,", "5", "NaN,", "--1,", ",",
-        ] {
-            assert_eq!(short_float(text.as_bytes()), None, "{text}");
-        }
-        let zero = short_float(b"-0.0,").unwrap();
-        assert!(zero.0 == 0.0 && zero.0.is_sign_negative() && zero.1 == 4);
     }
 
     #[test]
