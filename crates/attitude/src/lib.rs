@@ -67,6 +67,7 @@ pub mod digits;
 pub mod estimate;
 pub mod frames;
 pub mod joint;
+mod lanes;
 mod median;
 pub mod noise;
 mod open_class;

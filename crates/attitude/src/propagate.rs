@@ -31,7 +31,6 @@ pub mod covariance;
 mod difference;
 mod executor;
 mod lagrange;
-mod lanes;
 mod magnus;
 mod method;
 mod propagator;

@@ -8,6 +8,7 @@ use super::segment::{Scatter, Segment};
 use crate::median::median;
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Vector3};
+use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::LazyLock;
 
@@ -44,6 +45,8 @@ pub(super) const LEAST_GRAVITY: f64 = 0.5;
 const MEMORY: usize = 64;
 /// Scatter of gravity that is none, g^2.
 pub(super) const FLOOR: f64 = 4e-4;
+/// Hypotheses that are judged side by side.
+const ABREAST: usize = 2;
 /// Most that one segment says.
 const CLIP: f64 = 3.0;
 /// Evidence below which a hypothesis is judged by every fourth segment alone: eight have spoken against it. Of a sound
@@ -220,32 +223,36 @@ impl Residuals {
             false => 1.0 - 1.0 / MEMORY as f64,
         };
         self.count += 1;
+        let hypotheses = self.normal.len();
         let prior = Matrix3::from_diagonal_element(1e-4 / segment.bias_sigma.powi(2));
-        let sums = self.normal.iter_mut().zip(&mut self.slope);
-        let (mut wanders, mut as_recorded) = (0.0, 0.0);
-        let last = &mut self.last;
-        let of = sums
-            .zip(BANK.iter())
-            .enumerate()
-            .map(|(h, ((normal, slope), hypothesis))| {
-                if !judged(h) && as_recorded < UNUSUAL {
-                    return as_recorded;
-                }
-                let found = segment.scatter::<3>(&hypothesis.map, &[], &Vector3::zeros());
-                let weight = 1.0 / (1.0 + found.s / 1e-3);
-                *normal = *normal * kept + found.a * weight;
-                *slope = *slope * kept + found.b * weight;
-                let inverse = (*normal + prior).try_inverse();
-                let bias = inverse.map_or_else(Vector3::zeros, |inverse| inverse * *slope);
-                let missing = (LEAST_GRAVITY - found.gravity).max(0.0);
-                let s = found.at(&bias).max(1e-8);
-                if h == 0 {
-                    *last = Some(found);
-                    (wanders, as_recorded) = (s, s + missing * missing);
-                }
-                s + missing * missing
-            })
-            .collect();
+        let mut take = |h: usize, found: &Scatter<3>| -> (f64, f64) {
+            let (normal, slope) = (&mut self.normal[h], &mut self.slope[h]);
+            let weight = 1.0 / (1.0 + found.s / 1e-3);
+            *normal = *normal * kept + found.a * weight;
+            *slope = *slope * kept + found.b * weight;
+            let inverse = (*normal + prior).try_inverse();
+            let bias = inverse.map_or_else(Vector3::zeros, |inverse| inverse * *slope);
+            let missing = (LEAST_GRAVITY - found.gravity).max(0.0);
+            (found.at(&bias).max(1e-8), missing * missing)
+        };
+        let first = segment.scatter::<3>(&BANK[0].map, &[], &Vector3::zeros());
+        let (wanders, missing) = take(0, &first);
+        let as_recorded = wanders + missing;
+        self.last = Some(first);
+        let mut of = vec![as_recorded; hypotheses];
+        let is_usual = as_recorded < UNUSUAL;
+        let is_judged = |h: &usize| judged(*h) || !is_usual;
+        let all: Vec<usize> = (1..hypotheses).filter(is_judged).collect();
+        for some in all.chunks(ABREAST) {
+            // The last of too few once more.
+            let place = |i: usize| some[i.min(some.len() - 1)];
+            let maps: [&Matrix3<f64>; ABREAST] = from_fn(|i| &BANK[place(i)].map);
+            let found = segment.scatters_under(maps);
+            for (h, found) in some.iter().zip(&found) {
+                let (s, missing) = take(*h, found);
+                of[*h] = s + missing;
+            }
+        }
         Row {
             of,
             wanders,

@@ -5,6 +5,8 @@
 //!
 //! The derivation is in `docs/theory/consistency.md`.
 
+mod several;
+
 use super::blocks::Block;
 use super::euler::body_angles;
 use crate::record::Nanos;

@@ -17,8 +17,8 @@
 //! On recordings, bursts of 1 to 50 samples cut out: docs/accuracy.md, "Missing samples".
 
 use super::lagrange::Quadrature;
-use super::lanes::Triple;
 use super::magnus::MOMENTS;
+use crate::lanes::Triple;
 
 /// Samples looked at, on both sides together. More tell nothing more (docs/accuracy.md).
 pub(crate) const NEIGHBOURS: usize = 12;

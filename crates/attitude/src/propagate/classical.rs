@@ -4,10 +4,10 @@
 //! (`docs/theory/attitude.md` 1, 6).
 
 use super::columns::Track;
-use super::lanes::Triple;
 use super::method::Method;
 use super::turn::Turn;
 use super::window::{Note, Step};
+use crate::lanes::Triple;
 
 /// Coning-optimal weights by lag, for blocks of 2, 3 and 4 increments (Miller 1983; docs/theory/attitude.md 4.4).
 const KAPPA: [&[f64]; 5] = [

@@ -6,8 +6,8 @@
 
 use super::columns::{Track, secs};
 use super::lagrange::{Quadrature, legendre};
-use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
+use crate::lanes::{Lanes, Triple};
 
 /// Unknowns at most: enough beside a hole, where more would only amplify noise (docs/theory/attitude.md 6.4).
 pub(crate) const UNKNOWNS: usize = 9;

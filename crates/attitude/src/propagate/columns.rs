@@ -3,7 +3,7 @@
 //! A run is what lies between two breaks (start, hold, reset). Element k of a track is sample k of
 //! the run; the interval k ends at element k and begins at element k - 1. Old elements are dropped.
 
-use super::lanes::{Lanes, Triple};
+use crate::lanes::{Lanes, Triple};
 
 /// Share of the increment's own length that separates a stretch without rotation data from clock rounding.
 const HOLE: f64 = 0.05;

@@ -6,8 +6,8 @@
 //! constant rate comes through untouched.
 
 use super::difference::FEWER;
-use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
+use crate::lanes::{Lanes, Triple};
 use std::ops::Range;
 
 /// Most points an interpolation has: a window of increments has one more knot than increments.

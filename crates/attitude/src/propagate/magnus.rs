@@ -8,10 +8,10 @@
 //! Magnus 1954; Blanes, Casas, Ros 2000 (time-symmetric truncation); coefficients for Legendre
 //! moments as in `docs/theory/attitude.md` 3, checked here against the power series and golden vectors.
 
-use super::lanes::{Lanes, Triple};
 use super::method::Order;
 use super::series;
 use super::turn::Turn;
+use crate::lanes::{Lanes, Triple};
 
 /// Number of moments carried: b_0 .. b_8.
 pub(crate) const MOMENTS: usize = 9;

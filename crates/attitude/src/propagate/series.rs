@@ -4,9 +4,9 @@
 //! per interval is large. Expanded about the middle: about the start it loses every digit to
 //! cancellation on coarse data (`docs/theory/attitude.md` 3).
 
-use super::lanes::Triple;
 use super::magnus::{MOMENTS, Moments, halves};
 use super::turn::Turn;
+use crate::lanes::Triple;
 
 /// Sum of `|b_j|` beyond which neither samples nor series mean anything: more than a turn in one step.
 const HOPELESS: f64 = 8.0;

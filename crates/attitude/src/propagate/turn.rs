@@ -3,7 +3,7 @@
 //! `cos(a/2)` of a small angle has lost the digits of the angle; `cos(a/2) - 1` has not. The
 //! accumulator adds that difference to the attitude, so it is what every method delivers.
 
-use super::lanes::{Lanes, Triple};
+use crate::lanes::{Lanes, Triple};
 
 /// `[cos(a/2) - 1, sin(a/2) * axis]`: a unit quaternion minus the identity.
 #[derive(Clone, Copy, Debug, PartialEq)]

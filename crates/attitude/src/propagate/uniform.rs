@@ -5,8 +5,8 @@
 //! differences. The tables come from the general path, so both agree to rounding by construction.
 
 use super::lagrange::{self, POINTS, Quadrature};
-use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
+use crate::lanes::{Lanes, Triple};
 
 const EVEN: usize = 5;
 const ODD: usize = 4;

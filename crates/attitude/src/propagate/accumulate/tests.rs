@@ -1,5 +1,5 @@
 use super::*;
-use crate::propagate::lanes::Triple;
+use crate::lanes::Triple;
 use crate::propagate::turn::Turn;
 
 #[path = "double.rs"]

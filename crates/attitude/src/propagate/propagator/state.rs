@@ -2,11 +2,11 @@
 
 use super::world::TurningWorld;
 use crate::frames::{Body, In};
+use crate::lanes::Triple;
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::columns::{Track, secs};
 use crate::propagate::covariance::Covariance;
 use crate::propagate::difference::Difference;
-use crate::propagate::lanes::Triple;
 use crate::propagate::method::Method;
 use crate::propagate::report::Report;
 use crate::propagate::settings::Settings;

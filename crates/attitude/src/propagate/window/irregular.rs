@@ -2,10 +2,10 @@
 //! stamps. As many samples as the data support. Pure.
 
 use super::{Note, Step, WindowKernel};
+use crate::lanes::Lanes;
 use crate::propagate::bridge::{self, NEIGHBOURS, Observation};
 use crate::propagate::collocation;
 use crate::propagate::columns::{Track, secs};
-use crate::propagate::lanes::Lanes;
 use crate::propagate::magnus::{self, MOMENTS, Moments};
 use crate::propagate::method::{LARGEST_WINDOW, Placement};
 

@@ -1,12 +1,12 @@
 //! `f64` times N -> the same arithmetic on each. Pure.
 //!
-//! Neighbouring intervals of a log go through identical operations, so the kernels are written
+//! Neighbouring intervals of a log, and a segment under several maps, go through identical operations, so the kernels are written
 //! once over `[f64; N]` and the compiler lays them on whatever vector registers there are.
 //! Each lane does exactly the operations N = 1 does, in the same order (Rust never contracts
 //! to fused multiply-add), so how intervals are grouped cannot change a bit.
 
 use std::array::from_fn;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// N numbers side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +65,14 @@ impl<const N: usize> Mul<f64> for Lanes<N> {
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
         Lanes(from_fn(|i| self.0[i] * factor))
+    }
+}
+
+impl<const N: usize> Div<f64> for Lanes<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, divisor: f64) -> Self {
+        Lanes(from_fn(|i| self.0[i] / divisor))
     }
 }
 
