@@ -128,9 +128,9 @@ struct Weight {
     ratio: f64,
     /// One sample only.
     is_alone: bool,
-    /// So long that it may be motion.
+    /// Duration at which it may be motion.
     is_long: bool,
-    /// So far off that with a quiet force it is none.
+    /// Distance at which, with a quiet force, it is none.
     is_violent: bool,
     /// The accelerometer felt nothing about it.
     is_quiet: bool,

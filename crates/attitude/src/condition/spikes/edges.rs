@@ -124,7 +124,7 @@ impl Spikes {
     }
 }
 
-/// Those of `ahead` that follow `entry` in one epoch, each later than the one before, without a hole.
+/// Part of `ahead` that follows `entry` in one epoch, each later than the one before, without a hole.
 fn in_steps<'a>(entry: &Entry, ahead: &'a [Entry], spacing: i64) -> &'a [Entry] {
     let before = std::iter::once(entry).chain(ahead);
     let follows = |(before, next): &(&Entry, &Entry)| {
