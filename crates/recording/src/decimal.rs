@@ -16,29 +16,41 @@ const TENS: [f64; EXACT_DIGITS + 1] = [
 pub(crate) fn short(text: &[u8]) -> Option<(f64, usize)> {
     let is_negative = text.first() == Some(&b'-');
     let start = usize::from(is_negative);
-    let (mut pos, mut digits, mut point) = (start, 0_u64, None);
-    let end = loop {
-        match text.get(pos).copied().unwrap_or(b' ') {
-            digit @ b'0'..=b'9' => digits = digits * 10 + u64::from(digit - b'0'),
-            b'.' if point.is_none() && pos > start => point = Some(pos),
-            b',' | b']' | b'}' | b' ' | b'\t' | b'\r' | b'\n' => break pos,
-            _ => return None,
+    // One more than is exact, and the point: what is longer is not begun, and no sum of so few overflows.
+    let most = text.len().min(start + EXACT_DIGITS + 2);
+    let body = text.get(start..most)?;
+    let mut sum = 0;
+    let whole = digits(body, &mut sum);
+    let (decimals, length) = match body.get(whole) {
+        Some(b'.') => {
+            let decimals = digits(body.get(whole + 1..)?, &mut sum);
+            (decimals, whole + 1 + decimals)
         }
-        pos += 1;
-        if pos > start + EXACT_DIGITS + 1 {
-            return None;
-        }
+        _ => (0, whole),
     };
-    let decimals = point.map_or(0, |point| end - point - 1);
-    let whole = point.unwrap_or(end) - start;
+    let is_end = matches!(
+        text.get(start + length),
+        None | Some(b',' | b']' | b'}' | b' ' | b'\t' | b'\r' | b'\n')
+    );
     // `.5`, `5.` and `05` are no JSON, and more digits are not exact.
-    let has_leading_zero = whole > 1 && text.get(start) == Some(&b'0');
+    let has_leading_zero = whole > 1 && body.first() == Some(&b'0');
+    let has_bare_point = length == whole + 1;
     let is_exact = whole + decimals <= EXACT_DIGITS;
-    if whole == 0 || has_leading_zero || (point.is_some() && decimals == 0) || !is_exact {
+    if !is_end || whole == 0 || has_leading_zero || has_bare_point || !is_exact {
         return None;
     }
-    let value = digits as f64 / TENS.get(decimals)?;
-    Some((if is_negative { -value } else { value }, end))
+    let value = sum as f64 / TENS.get(decimals)?;
+    Some((if is_negative { -value } else { value }, start + length))
+}
+
+/// Number of digits at the beginning, which are put behind those of `sum`.
+#[inline]
+fn digits(text: &[u8], sum: &mut u64) -> usize {
+    let value = |byte: &u8| byte.wrapping_sub(b'0');
+    let count = text.iter().take_while(|byte| value(byte) < 10).count();
+    let all = text.iter().take(count);
+    *sum = all.fold(*sum, |sum, byte| sum * 10 + u64::from(value(byte)));
+    count
 }
 
 /// Value of a text that is such a decimal and nothing else.

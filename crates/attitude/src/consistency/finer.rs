@@ -327,16 +327,24 @@ impl Judged {
         directions: &[Matrix3<f64>],
         project: Option<Projection>,
     ) -> Option<Judged> {
-        let total = |map: &Matrix3<f64>| -> f64 {
-            let scatter = |segment: &&Segment| {
-                let found = segment.scatter::<3>(map, &[], &Vector3::zeros());
-                (found.s + FLOOR).ln()
-            };
-            begun_by(segments).map(|segment| scatter(&segment)).sum()
+        let totals = |maps: [&Matrix3<f64>; 2]| -> [f64; 2] {
+            let scatters = begun_by(segments).map(|segment| segment.scatters_under(maps));
+            scatters.fold([0.0; 2], |[some, other], [a, b]| {
+                [some + (a.s + FLOOR).ln(), other + (b.s + FLOOR).ln()]
+            })
         };
         let by_total =
             |some: &(f64, Matrix3<f64>), other: &(f64, Matrix3<f64>)| some.0.total_cmp(&other.0);
-        let totals = starts.iter().map(|map| (total(map), *map));
+        let totals = starts.chunks(2).flat_map(|pair| {
+            // Of an odd number the last twice.
+            let [first, second] = [pair.first(), pair.last()].map(|map| map.copied());
+            let maps = first.zip(second);
+            maps.map(|(first, second)| {
+                let [some, other] = totals([&first, &second]);
+                [(some, first), (other, second)]
+            })
+        });
+        let totals = totals.flatten();
         let (_, mut map) = totals.min_by(by_total)?;
         let mut sigma = f64::NAN;
         for _ in 0..project.map_or(1, |_| ROUNDS) {
