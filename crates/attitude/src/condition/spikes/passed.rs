@@ -156,6 +156,8 @@ impl Passed {
                 if !self.is_suspect(&first, (timing.spacing(), timing.coarse())) {
                     self.spikes.past.push(&first, &first.value);
                     self.waiting.clear();
+                    // Of a beginning there were more.
+                    self.waiting.shrink_to(MOST);
                     return;
                 }
             }
