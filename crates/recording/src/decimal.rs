@@ -19,14 +19,13 @@ pub(crate) fn short(text: &[u8]) -> Option<(f64, usize)> {
     // One more than is exact, and the point: what is longer is not begun, and no sum of so few overflows.
     let most = text.len().min(start + EXACT_DIGITS + 2);
     let body = text.get(start..most)?;
-    let mut sum = 0;
-    let whole = digits(body, &mut sum);
-    let (decimals, length) = match body.get(whole) {
+    let (sum, whole) = digits(body, 0);
+    let (sum, decimals, length) = match body.get(whole) {
         Some(b'.') => {
-            let decimals = digits(body.get(whole + 1..)?, &mut sum);
-            (decimals, whole + 1 + decimals)
+            let (sum, decimals) = digits(body.get(whole + 1..)?, sum);
+            (sum, decimals, whole + 1 + decimals)
         }
-        _ => (0, whole),
+        _ => (sum, 0, whole),
     };
     let is_end = matches!(
         text.get(start + length),
@@ -43,14 +42,19 @@ pub(crate) fn short(text: &[u8]) -> Option<(f64, usize)> {
     Some((if is_negative { -value } else { value }, start + length))
 }
 
-/// Number of digits at the beginning, which are put behind those of `sum`.
+/// Digits at the beginning, put behind those of `sum`, and their number.
 #[inline]
-fn digits(text: &[u8], sum: &mut u64) -> usize {
-    let value = |byte: &u8| byte.wrapping_sub(b'0');
-    let count = text.iter().take_while(|byte| value(byte) < 10).count();
-    let all = text.iter().take(count);
-    *sum = all.fold(*sum, |sum, byte| sum * 10 + u64::from(value(byte)));
-    count
+fn digits(text: &[u8], mut sum: u64) -> (u64, usize) {
+    let mut count = 0;
+    for byte in text {
+        let value = byte.wrapping_sub(b'0');
+        if value > 9 {
+            break;
+        }
+        sum = sum * 10 + u64::from(value);
+        count += 1;
+    }
+    (sum, count)
 }
 
 /// Value of a text that is such a decimal and nothing else.
