@@ -8,7 +8,6 @@ use super::segment::{Scatter, Segment};
 use crate::median::median;
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Vector3};
-use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::LazyLock;
 
@@ -45,8 +44,6 @@ pub(super) const LEAST_GRAVITY: f64 = 0.5;
 const MEMORY: usize = 64;
 /// Scatter of gravity that is none, g^2.
 pub(super) const FLOOR: f64 = 4e-4;
-/// Hypotheses that are judged side by side.
-const ABREAST: usize = 2;
 /// Most that one segment says.
 const CLIP: f64 = 3.0;
 /// Evidence below which a hypothesis is judged by every fourth segment alone: eight have spoken against it. Of a sound
@@ -243,15 +240,10 @@ impl Residuals {
         let is_usual = as_recorded < UNUSUAL;
         let is_judged = |h: &usize| judged(*h) || !is_usual;
         let all: Vec<usize> = (1..hypotheses).filter(is_judged).collect();
-        for some in all.chunks(ABREAST) {
-            // The last of too few once more.
-            let place = |i: usize| some[i.min(some.len() - 1)];
-            let maps: [&Matrix3<f64>; ABREAST] = from_fn(|i| &BANK[place(i)].map);
-            let found = segment.scatters_under(maps);
-            for (h, found) in some.iter().zip(&found) {
-                let (s, missing) = take(*h, found);
-                of[*h] = s + missing;
-            }
+        let found = segment.scatters_under(all.iter().map(|h| &BANK[*h].map));
+        for (h, found) in all.into_iter().zip(&found) {
+            let (s, missing) = take(h, found);
+            of[h] = s + missing;
         }
         Row {
             of,

@@ -327,24 +327,16 @@ impl Judged {
         directions: &[Matrix3<f64>],
         project: Option<Projection>,
     ) -> Option<Judged> {
-        let totals = |maps: [&Matrix3<f64>; 2]| -> [f64; 2] {
-            let scatters = begun_by(segments).map(|segment| segment.scatters_under(maps));
-            scatters.fold([0.0; 2], |[some, other], [a, b]| {
-                [some + (a.s + FLOOR).ln(), other + (b.s + FLOOR).ln()]
-            })
-        };
+        let mut totals = vec![0.0; starts.len()];
+        for segment in begun_by(segments) {
+            let found = segment.scatters_under(starts.iter());
+            for (total, found) in totals.iter_mut().zip(found) {
+                *total += (found.s + FLOOR).ln();
+            }
+        }
         let by_total =
             |some: &(f64, Matrix3<f64>), other: &(f64, Matrix3<f64>)| some.0.total_cmp(&other.0);
-        let totals = starts.chunks(2).flat_map(|pair| {
-            // Of an odd number the last twice.
-            let [first, second] = [pair.first(), pair.last()].map(|map| map.copied());
-            let maps = first.zip(second);
-            maps.map(|(first, second)| {
-                let [some, other] = totals([&first, &second]);
-                [(some, first), (other, second)]
-            })
-        });
-        let totals = totals.flatten();
+        let totals = totals.into_iter().zip(starts.iter().copied());
         let (_, mut map) = totals.min_by(by_total)?;
         let mut sigma = f64::NAN;
         for _ in 0..project.map_or(1, |_| ROUNDS) {

@@ -9,6 +9,7 @@ mod several;
 
 use super::blocks::Block;
 use super::euler::body_angles;
+use crate::lanes::Lanes;
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, Vector3};
 use std::f64::consts::PI;
@@ -250,12 +251,8 @@ pub(super) fn half_turn(angle: &Vector3<f64>) -> Quaternion<f64> {
     let quarter = angle / 4.0;
     let square = quarter.norm_squared();
     let (cos, by) = if square <= SHORT {
-        (
-            1.0 - square / 2.0
-                * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0))),
-            1.0 - square / 6.0
-                * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))),
-        )
+        let (cos, by) = several::series(Lanes([square]));
+        (cos.0[0], by.0[0])
     } else {
         let length = square.sqrt();
         (length.cos(), length.sin() / length)

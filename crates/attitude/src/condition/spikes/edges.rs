@@ -53,6 +53,7 @@ impl Spikes {
                 .flatten();
         }
         let has_neighbour = !self.past.is_hole(entry, spacing, None);
+        let all: Vec<Entry> = std::iter::once(entry).chain(following).copied().collect();
         (1..=most(spacing)).find_map(|samples| {
             let behind = following.get(samples - 1..)?;
             if behind.len() < LEAST_BEHIND {
@@ -65,7 +66,6 @@ impl Spikes {
                 let weight = self.weight(&run, entry, following, (spacing, ordinary));
                 return weight.is_spike().then_some((run, weight.drops_force));
             }
-            let all: Vec<Entry> = std::iter::once(entry).chain(following).copied().collect();
             let half = Half {
                 within: all.get(..samples)?,
                 end: behind.first()?.value,

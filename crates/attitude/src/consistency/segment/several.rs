@@ -18,12 +18,25 @@ struct Turn<const N: usize> {
     v: Triple<N>,
 }
 
+/// Maps that are judged side by side: as many as a vector register of any machine holds.
+const ABREAST: usize = 2;
+
 impl Segment {
     /// Scatter of gravity under each map of the recorded rates; `p` is the bias left, rad/s of the true rate.
-    pub(in crate::consistency) fn scatters_under<const N: usize>(
+    pub(in crate::consistency) fn scatters_under<'a>(
         &self,
-        maps: [&Matrix3<f64>; N],
-    ) -> [Scatter<3>; N] {
+        maps: impl Iterator<Item = &'a Matrix3<f64>>,
+    ) -> Vec<Scatter<3>> {
+        let maps: Vec<_> = maps.collect();
+        let each = maps.chunks(ABREAST).flat_map(|some| {
+            // The last of too few once more.
+            let all: [_; ABREAST] = from_fn(|i| some[i.min(some.len() - 1)]);
+            self.side_by_side(all).into_iter().take(some.len())
+        });
+        each.collect()
+    }
+
+    fn side_by_side<const N: usize>(&self, maps: [&Matrix3<f64>; N]) -> [Scatter<3>; N] {
         let maps: Columns<N> =
             from_fn(|column| Triple::of_lanes(|i| vector(maps[i].column(column).into_owned())));
         let mut attitude = Turn {
@@ -86,15 +99,25 @@ fn half_turns<const N: usize>(angle: Triple<N>) -> Turn<N> {
     if !square.0.iter().all(|square| *square <= SHORT) {
         return each_half_turn(&angle);
     }
+    let (w, by) = series(square);
+    Turn {
+        w,
+        v: quarter.times(by),
+    }
+}
+
+/// Cosine of an angle, and its sine by it, by the square of the angle, [`SHORT`] at most.
+#[inline(always)]
+pub(super) fn series<const N: usize>(square: Lanes<N>) -> (Lanes<N>, Lanes<N>) {
     let one = Lanes::splat(1.0);
     let factor = |[a, b, c, d]: [f64; 4]| {
         let inner = one - square / c * (one - square / d);
         one - square / a * (one - square / b * inner)
     };
-    Turn {
-        w: factor([2.0, 12.0, 30.0, 56.0]),
-        v: quarter.times(factor([6.0, 20.0, 42.0, 72.0])),
-    }
+    (
+        factor([2.0, 12.0, 30.0, 56.0]),
+        factor([6.0, 20.0, 42.0, 72.0]),
+    )
 }
 
 /// The same lane by lane, where a series is too short for one of them.
@@ -177,14 +200,15 @@ mod tests {
         // Beyond the series, within it, and on both sides of it in one pair of maps.
         for rate in [0.3, 9.0, 40.0] {
             let segment = segment(rate);
-            for pair in BANK.windows(2) {
-                let maps = [&pair[0].map, &pair[1].map];
-                for (found, map) in segment.scatters_under(maps).iter().zip(maps) {
-                    let alone = segment.scatter::<3>(map, &[], &Vector3::zeros());
-                    assert_eq!(found.s.to_bits(), alone.s.to_bits(), "{rate} {map}");
-                    assert_eq!((found.a, found.b), (alone.a, alone.b), "{rate} {map}");
-                    assert_eq!(found.gravity.to_bits(), alone.gravity.to_bits());
-                }
+            let maps = || BANK.iter().map(|hypothesis| &hypothesis.map);
+            let found = segment.scatters_under(maps());
+            assert_eq!(found.len(), BANK.len());
+            assert_eq!(segment.scatters_under(maps().take(3)).len(), 3);
+            for (found, map) in found.iter().zip(maps()) {
+                let alone = segment.scatter::<3>(map, &[], &Vector3::zeros());
+                assert_eq!(found.s.to_bits(), alone.s.to_bits(), "{rate} {map}");
+                assert_eq!((found.a, found.b), (alone.a, alone.b), "{rate} {map}");
+                assert_eq!(found.gravity.to_bits(), alone.gravity.to_bits());
             }
         }
     }

@@ -467,7 +467,7 @@ pub static ROWS: [Row; 38] = [
     Row {
         setting: SPIKES,
         meaning: "Spikes: one to three samples far off the line between their neighbours, which nothing else felt: repair (the gyro's by that line; without those of the accelerometer), keep",
-        effect: "A spike that is integrated rotates the attitude forever: one of 30 rad/s at 100 Hz by 17 degrees. Each that is repaired is counted and shown. A live stream and {method} commit wait for no later sample: there the attitude goes back to where it would be without the spike, one to four samples later, and that sample is marked `repaired`.",
+        effect: "A spike that is integrated rotates the attitude forever: one of 30 rad/s at 100 Hz by 17 degrees. Each that is repaired is counted and shown. A live stream and {method} commit wait for no later sample: there the attitude goes back to where it would be without the spike, one to four samples later (of the first samples sixteen), and that sample is marked `repaired`.",
         default: Default::Value(SpikePolicy::Repair.name()),
         placeholder: "SPIKES",
         words: &[
