@@ -208,11 +208,11 @@ impl Worker {
             }
             worker.flush()
         });
-        // Early enough that no sync is later than it should be.
+        // Early enough that no sync is later than it should be, also where the last tick was late and this one is not.
         let due = self
             .settings
             .sync_every
-            .saturating_sub(self.settings.flush_every);
+            .saturating_sub(self.settings.flush_every * 3 / 2);
         if let Some(file) = &self.file
             && now.duration_since(self.synced) >= due
             && self.syncer.request(&file.file, file.bytes)
