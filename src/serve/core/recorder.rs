@@ -113,6 +113,12 @@ impl Settings {
             provenance: Provenance::default(),
         }
     }
+
+    /// Whether a tick, so long after the one that asked for a sync, asks for the next. That is the tick before
+    /// [`Settings::sync_every`] is over, also where either of the two is late by up to half of [`Settings::flush_every`].
+    fn is_sync_due(&self, since: Duration) -> bool {
+        since >= self.sync_every.saturating_sub(self.flush_every * 3 / 2)
+    }
 }
 
 /// State of a recording.
@@ -323,6 +329,16 @@ impl Drop for Recorder {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_late_tick_moves_no_sync_to_another_tick() {
+        let settings = Settings::new("a.mcap");
+        for (before, now) in [(0, 0), (1, 0), (0, 1), (90, 0), (0, 90), (90, 90)] {
+            let since = |ticks: u64| Duration::from_millis(200 * ticks + now - before);
+            assert!(!settings.is_sync_due(since(3)), "{before} {now}");
+            assert!(settings.is_sync_due(since(4)), "{before} {now}");
+        }
+    }
 
     #[test]
     fn a_sync_that_is_done_late_takes_nothing_back() {

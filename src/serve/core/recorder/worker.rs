@@ -208,13 +208,8 @@ impl Worker {
             }
             worker.flush()
         });
-        // Early enough that no sync is later than it should be, also where the last tick was late and this one is not.
-        let due = self
-            .settings
-            .sync_every
-            .saturating_sub(self.settings.flush_every * 3 / 2);
         if let Some(file) = &self.file
-            && now.duration_since(self.synced) >= due
+            && self.settings.is_sync_due(now.duration_since(self.synced))
             && self.syncer.request(&file.file, file.bytes)
         {
             self.synced = now;
