@@ -8,6 +8,8 @@
 //! level axes, its sigma the one in the direction of the error; heading the part about the vertical. A reference has
 //! noise of its own. How much shows in its scatter over one step, where the gyro is better than anything, and is
 //! counted beside sigma: once for the sample, once for the first one, by which the worlds were laid on each other.
+//! What was laid on each other has taken an error of the estimate away, which is in all that is left: its sigma counts
+//! as well, at its most.
 
 use super::matching::{Track, for_each_match};
 use super::statistics::quantile;
@@ -15,7 +17,7 @@ use super::{Align, Reference, Stamped};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{AttitudeCovariance, Nanos};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use std::ops::ControlFlow;
 
 /// An attitude with what is known of its error.
@@ -114,16 +116,20 @@ pub fn consistency<'r>(
         let mut sums = Sums::default();
         for part in &parts {
             let rotation = align.rotation(&estimated, part);
+            let own_at = |place: usize| {
+                let known = rows.get(place)?;
+                let attitude = rotation * known.q_nb;
+                Some(known.covariance.in_navigation_axes(&attitude))
+            };
+            let taken_away = taken_away(align, &estimated, part, own_at);
             let _ = for_each_match(&estimated, part, |stamp, q_ref_est, place| {
                 // Between two estimates the later one's sigma: it is the larger of the gyro alone.
-                let Some(known) = rows.get(place) else {
+                let Some(own) = own_at(place) else {
                     return ControlFlow::Continue(());
                 };
                 let error = (q_ref_est * rotation.inverse()).inverse();
-                let own = known
-                    .covariance
-                    .in_navigation_axes(&(rotation * known.q_nb));
                 sums.is_stated |= own.trace() > 0.0;
+                let own = own + taken_away;
                 let at = bounded(stamp, &error, &own, 2.0 * reference_noise.powi(2));
                 sums.add(&at);
                 visit(&at);
@@ -157,6 +163,40 @@ pub fn consistency<'r>(
         align,
         leaning,
     })
+}
+
+/// Most that the covariance of the error may be which `align` took away, rad^2 in the reference's axes: that of the
+/// first instant, or of the mean of all, which is at most the mean of theirs, however they go together. `own` is the
+/// estimate's by its place.
+fn taken_away(
+    align: Align,
+    estimate: &Track<'_>,
+    reference: &Track<'_>,
+    own: impl Fn(usize) -> Option<Matrix3<f64>>,
+) -> Matrix3<f64> {
+    let is_of_the_first = match align {
+        Align::None => return Matrix3::zeros(),
+        Align::First | Align::FirstHeading => true,
+        Align::Heading | Align::Best => false,
+    };
+    let (mut sum, mut n) = (Matrix3::zeros(), 0.0_f64);
+    let _ = for_each_match(estimate, reference, |_, _, place| {
+        if let Some(own) = own(place) {
+            sum += own;
+            n += 1.0;
+        }
+        match is_of_the_first {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    });
+    let all = sum / n.max(1.0);
+    match align {
+        Align::FirstHeading | Align::Heading => {
+            Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, all.m33))
+        }
+        Align::None | Align::First | Align::Best => all,
+    }
 }
 
 /// `more` is the variance of the reference about each axis, rad^2.
@@ -270,7 +310,6 @@ fn scatter_of_a_step(estimate: &Track<'_>, reference: &Track<'_>) -> Option<f64>
 mod tests {
     use super::*;
     use crate::quaternion::RotationVector;
-    use nalgebra::Vector3;
 
     const ROWS: i64 = 2000;
 
@@ -301,6 +340,15 @@ mod tests {
             .collect()
     }
 
+    fn about_the_vertical(
+        heading: f64,
+        tilt: f64,
+        q_nb: &Quaternion<Nav, Body>,
+    ) -> AttitudeCovariance {
+        let variances = Vector3::new(tilt, tilt, heading).map(|sigma| sigma * sigma);
+        AttitudeCovariance::of_navigation_axes(&Matrix3::from_diagonal(&variances), q_nb)
+    }
+
     fn judged(known: &[UncertainAttitude], align: Align) -> Consistency {
         consistency(known, &reference(), align, |_| {}).unwrap()
     }
@@ -308,7 +356,7 @@ mod tests {
     #[test]
     fn an_error_of_heading_is_no_error_of_tilt_and_the_share_is_that_of_the_time() {
         // Heading grows to 0.4 rad under a sigma of 0.1: within three sigma for three quarters.
-        let found = judged(&estimate(|t| Vector3::z() * 0.4 * t, 0.1), Align::First);
+        let found = judged(&estimate(|t| Vector3::z() * 0.4 * t, 0.1), Align::None);
         assert!((found.heading.inside - 0.75).abs() < 0.01, "{found:?}");
         assert!(
             found.tilt.inside == 1.0 && found.tilt.rms < 1e-3,
@@ -319,8 +367,44 @@ mod tests {
             "{found:?}"
         );
         assert!(found.reference_noise < 1e-4, "{found:?}");
-        let honest = judged(&estimate(|t| Vector3::z() * 0.4 * t, 0.14), Align::First);
+        let honest = judged(&estimate(|t| Vector3::z() * 0.4 * t, 0.14), Align::None);
         assert!(!honest.is_beyond(), "{honest:?}");
+    }
+
+    #[test]
+    fn the_sigma_of_what_an_alignment_takes_away_counts() {
+        // Heading drifts by 0.4 rad under a sigma that grows as it does: honest, and wherever the worlds are laid on
+        // each other it stays so.
+        let mut drifting = estimate(|t| Vector3::z() * 0.4 * t, 0.0);
+        for (i, known) in drifting.iter_mut().enumerate() {
+            let sigma = 0.25 * i as f64 / ROWS as f64;
+            known.covariance = AttitudeCovariance::from_sigma(Vector3::from_element(sigma));
+        }
+        for align in Align::ALL {
+            let found = judged(&drifting, align);
+            assert!(!found.is_beyond(), "{align} {found:?}");
+        }
+        // Heading that is found in the first second, from 0.3 rad off under a sigma of 0.3.
+        let off = |t: f64| 0.3 * (1.0 - 20.0 * t).max(0.0);
+        let mut finding = estimate(|t| Vector3::z() * off(t), 0.01);
+        for (i, known) in finding.iter_mut().enumerate() {
+            let sigma = off(i as f64 / ROWS as f64).max(0.01);
+            known.covariance = about_the_vertical(sigma, 0.01, &known.q_nb);
+        }
+        let found = judged(&finding, Align::FirstHeading);
+        assert!(!found.is_beyond(), "{found:?}");
+        // An error that no alignment takes away, under a sigma that is a tenth of it.
+        let wrong = estimate(|t| Vector3::z() * 0.4 * (9.0 * t).sin(), 0.03);
+        for align in Align::ALL {
+            assert!(judged(&wrong, align).is_beyond(), "{align}");
+        }
+        // Nor does a heading's sigma excuse a tilt.
+        let mut tilted = estimate(|t| Vector3::x() * 0.1 * (9.0 * t).sin(), 0.0);
+        for known in &mut tilted {
+            known.covariance = about_the_vertical(0.3, 0.005, &known.q_nb);
+        }
+        let found = judged(&tilted, Align::Heading);
+        assert!(found.tilt.inside < 0.5, "{found:?}");
     }
 
     #[test]
