@@ -239,12 +239,23 @@ impl Residuals {
         let mut of = vec![as_recorded; hypotheses];
         let is_usual = as_recorded < UNUSUAL;
         let is_judged = |h: &usize| judged(*h) || !is_usual;
-        let all: Vec<usize> = (1..hypotheses).filter(is_judged).collect();
-        let found = segment.scatters_under(all.iter().map(|h| &BANK[*h].map));
-        for (h, found) in all.into_iter().zip(&found) {
+        let all = (1..hypotheses).filter(is_judged);
+        let (maps, factors): (Vec<_>, Vec<_>) = all.partition(|h| BANK[*h].factor.is_none());
+        let mut put = |h: usize, found: &Scatter<3>| {
             let (s, missing) = take(h, found);
             of[h] = s + missing;
+        };
+        if !maps.is_empty() {
+            let sums = segment.axis_sums();
+            maps.iter()
+                .for_each(|h| put(*h, &sums.under(&BANK[*h].map)));
         }
+        let of_them: Vec<f64> = factors.iter().filter_map(|h| BANK[*h].factor).collect();
+        let found = segment.scatters_times(&of_them);
+        factors
+            .iter()
+            .zip(&found)
+            .for_each(|(h, found)| put(*h, found));
         Row {
             of,
             wanders,

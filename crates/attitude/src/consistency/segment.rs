@@ -5,6 +5,7 @@
 //!
 //! The derivation is in `docs/theory/consistency.md`.
 
+mod axes;
 mod several;
 
 use super::blocks::Block;
@@ -28,6 +29,8 @@ const SIGMA_LEVER: f64 = 0.5;
 /// Least turn, rad, and least scatter of the force, g, of a segment that moves.
 const LEAST_TURN: f64 = 0.35;
 const LEAST_SCATTER: f64 = 0.05;
+/// Longest piece that is made of several, s.
+const LONGEST: f64 = 0.081;
 /// Turn (rad in whatever unit) and squared scatter that no sensor makes.
 const MOST: f64 = 1e6;
 /// Rows of the residual.
@@ -45,6 +48,20 @@ struct Piece {
     weight: [f64; WINDOWS],
     /// Second derivative of the same by gravity, 1/m.
     curvature: [f64; WINDOWS],
+}
+
+impl Piece {
+    /// Takes what follows it in.
+    fn join(&mut self, next: &Piece) {
+        let secs = self.secs + next.secs;
+        self.force = (self.force * self.secs + next.force * next.secs) / secs;
+        self.angle += next.angle;
+        self.secs = secs;
+        for k in 0..WINDOWS {
+            self.weight[k] += next.weight[k];
+            self.curvature[k] += next.curvature[k];
+        }
+    }
 }
 
 /// Four seconds of a run.
@@ -120,6 +137,27 @@ impl Segment {
             pieces: self.pieces.iter().map(scaled).collect(),
             ..*self
         }
+    }
+
+    /// The same with fewer pieces: neighbours are one while they turn by so little, rad as recorded.
+    fn joined(&self, farthest: f64) -> Segment {
+        let mut pieces: Vec<Piece> = Vec::with_capacity(self.pieces.len());
+        // Way of the last piece, rad: of its parts one by one.
+        let mut way = 0.0;
+        for piece in &self.pieces {
+            let more = piece.angle.norm();
+            match pieces.last_mut() {
+                Some(last) if last.secs + piece.secs <= LONGEST && way + more <= farthest => {
+                    last.join(piece);
+                    way += more;
+                }
+                _ => {
+                    pieces.push(*piece);
+                    way = more;
+                }
+            }
+        }
+        Segment { pieces, ..*self }
     }
 
     /// The same where what was recorded are the derivatives of roll, pitch and yaw; `up` is the sign of the body's z that is

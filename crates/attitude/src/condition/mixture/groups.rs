@@ -144,20 +144,23 @@ impl Groups {
             centres: [one, farthest(&one)],
             second: 0,
         };
-        let mut scatter = 0.0;
-        for _ in 0..PASSES {
-            (groups, scatter) = groups.regrouped(values)?;
+        for pass in 0..PASSES {
+            let before = groups.second;
+            groups = groups.regrouped(values)?;
+            if pass > 0 && groups.second == before {
+                // The same groups have the same centres again.
+                break;
+            }
         }
         let members = groups.second.count_ones();
         let changes = (groups.second ^ groups.second >> 1) & 0x7fff;
         let is_mixed =
             (FEWEST..=WINDOW as u32 - FEWEST).contains(&members) && changes.count_ones() >= CHANGES;
-        groups
-            .if_tight(scatter / (WINDOW as f64 - 2.0))
-            .filter(|_| is_mixed)
+        let tight = || groups.if_tight(groups.scatter(values) / (WINDOW as f64 - 2.0));
+        is_mixed.then(tight).flatten()
     }
 
-    fn regrouped(&self, values: &[Vector3<f64>; WINDOW]) -> Option<(Groups, f64)> {
+    fn regrouped(&self, values: &[Vector3<f64>; WINDOW]) -> Option<Groups> {
         let [a, b] = &self.centres;
         let mut sums = [(0.0, Vector3::zeros()); 2];
         let mut second = 0_u16;
@@ -170,12 +173,17 @@ impl Groups {
         }
         let [(n, first), (m, other)] = sums;
         let centres = [first / n, other / m];
-        let scatter = values.iter().enumerate().map(|(n, value)| {
-            let [a, b] = &centres;
-            (value - if second >> n & 1 == 1 { b } else { a }).norm_squared()
-        });
-        let scatter = scatter.sum();
-        (n > 0.0 && m > 0.0).then_some((Groups { centres, second }, scatter))
+        (n > 0.0 && m > 0.0).then_some(Groups { centres, second })
+    }
+
+    /// Sum of the squares of the members' distances from their centres.
+    fn scatter(&self, values: &[Vector3<f64>; WINDOW]) -> f64 {
+        let [a, b] = &self.centres;
+        let centre = |n: usize| if self.is_second(n) { b } else { a };
+        let squares = values.iter().enumerate();
+        squares
+            .map(|(n, value)| (value - centre(n)).norm_squared())
+            .sum()
     }
 
     fn if_tight(self, variance: f64) -> Option<Groups> {

@@ -1,6 +1,6 @@
 //! Segment under several maps side by side -> its scatter under each. Pure.
 //!
-//! Apart from the scatter under one map because the bank asks for nearly all of them: the arithmetic of each lane is that
+//! Apart from the scatter under one map because the bank asks for many factors: the arithmetic of each lane is that
 //! of [`Segment::scatter`] without directions and without a bias, in the same order, so that no bit differs.
 
 use super::{SHORT, Scatter, Segment, WINDOWS, half_turn, without_lever_arm};
@@ -9,15 +9,17 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use std::array::from_fn;
 
 /// Columns of a matrix for each lane.
-type Columns<const N: usize> = [Triple<N>; 3];
+pub(super) type Columns<const N: usize> = [Triple<N>; 3];
 
 /// A quaternion for each lane.
 #[derive(Clone, Copy)]
-struct Turn<const N: usize> {
+pub(super) struct Turn<const N: usize> {
     w: Lanes<N>,
     v: Triple<N>,
 }
 
+/// Turn of a piece that is made of several, rad.
+const FARTHEST: f64 = 0.1;
 /// Maps that are judged side by side: as many as a vector register of any machine holds.
 const ABREAST: usize = 2;
 
@@ -27,22 +29,36 @@ impl Segment {
         &self,
         maps: impl Iterator<Item = &'a Matrix3<f64>>,
     ) -> Vec<Scatter<3>> {
-        let maps: Vec<_> = maps.collect();
-        let each = maps.chunks(ABREAST).flat_map(|some| {
-            // The last of too few once more.
-            let all: [_; ABREAST] = from_fn(|i| some[i.min(some.len() - 1)]);
-            self.side_by_side(all).into_iter().take(some.len())
+        let maps: Vec<_> = maps.copied().collect();
+        let each = maps.chunks(ABREAST).flat_map(|some| self.abreast(some));
+        each.collect()
+    }
+
+    /// Scatter of gravity under each of these times the recorded rates, to some mrad and mg: neighbours are taken for one
+    /// piece while they turn by so little.
+    pub(in crate::consistency) fn scatters_times(&self, factors: &[f64]) -> Vec<Scatter<3>> {
+        let each = factors.chunks(ABREAST).flat_map(|some| {
+            let largest = some.iter().copied().fold(0.0, f64::max);
+            let maps: Vec<_> = some
+                .iter()
+                .map(|factor| Matrix3::from_diagonal_element(*factor))
+                .collect();
+            self.joined(FARTHEST / largest).abreast(&maps)
         });
         each.collect()
     }
 
-    fn side_by_side<const N: usize>(&self, maps: [&Matrix3<f64>; N]) -> [Scatter<3>; N] {
+    /// Scatter under each of so many maps, or fewer.
+    fn abreast(&self, maps: &[Matrix3<f64>]) -> impl Iterator<Item = Scatter<3>> + use<> {
+        // The last of too few once more.
+        let all: [_; ABREAST] = from_fn(|i| maps[i.min(maps.len() - 1)]);
+        self.side_by_side(all).into_iter().take(maps.len())
+    }
+
+    fn side_by_side<const N: usize>(&self, maps: [Matrix3<f64>; N]) -> [Scatter<3>; N] {
         let maps: Columns<N> =
             from_fn(|column| Triple::of_lanes(|i| vector(maps[i].column(column).into_owned())));
-        let mut attitude = Turn {
-            w: Lanes::splat(1.0),
-            v: Triple::ZERO,
-        };
+        let mut attitude = Turn::identity();
         let mut turned_by = [Triple::ZERO; 3];
         let mut force = [Triple::ZERO; WINDOWS];
         let mut lever = [[Triple::ZERO; 3]; WINDOWS];
@@ -87,13 +103,13 @@ fn vector(vector: Vector3<f64>) -> Triple<1> {
 
 /// Matrix of each lane times the one vector.
 #[inline(always)]
-fn times<const N: usize>(columns: &Columns<N>, vector: &Vector3<f64>) -> Triple<N> {
+pub(super) fn times<const N: usize>(columns: &Columns<N>, vector: &Vector3<f64>) -> Triple<N> {
     columns[0] * vector.x + columns[1] * vector.y + columns[2] * vector.z
 }
 
 /// Rotation by half of each vector.
 #[inline(always)]
-fn half_turns<const N: usize>(angle: Triple<N>) -> Turn<N> {
+pub(super) fn half_turns<const N: usize>(angle: Triple<N>) -> Turn<N> {
     let quarter = angle * 0.25;
     let square = quarter.norm_squared();
     if !square.0.iter().all(|square| *square <= SHORT) {
@@ -131,9 +147,16 @@ fn each_half_turn<const N: usize>(angle: &Triple<N>) -> Turn<N> {
 }
 
 impl<const N: usize> Turn<N> {
+    pub(super) fn identity() -> Turn<N> {
+        Turn {
+            w: Lanes::splat(1.0),
+            v: Triple::ZERO,
+        }
+    }
+
     /// Hamilton's product, `other` first in the body.
     #[inline(always)]
-    fn then(&self, other: &Turn<N>) -> Turn<N> {
+    pub(super) fn then(&self, other: &Turn<N>) -> Turn<N> {
         let (a, b) = (&self.v, &other.v);
         Turn {
             w: self.w * other.w - a.x * b.x - a.y * b.y - a.z * b.z,
@@ -147,7 +170,7 @@ impl<const N: usize> Turn<N> {
 
     /// Columns of its matrix.
     #[inline(always)]
-    fn columns(&self) -> Columns<N> {
+    pub(super) fn columns(&self) -> Columns<N> {
         let (w, Triple { x, y, z }) = (self.w, self.v);
         let one = Lanes::splat(1.0);
         [
@@ -172,14 +195,14 @@ impl<const N: usize> Turn<N> {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::indexing_slicing)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::consistency::bank::BANK;
     use crate::consistency::blocks::Block;
     use crate::record::Nanos;
 
     /// Four seconds of a motion, `rate` rad/s at most.
-    fn segment(rate: f64) -> Segment {
+    pub(in crate::consistency::segment) fn segment(rate: f64) -> Segment {
         let blocks: Vec<Block> = (0..200_i64)
             .map(|n| {
                 let phase = n as f64 * 0.07;
@@ -193,6 +216,32 @@ mod tests {
             })
             .collect();
         Segment::new(&blocks, 9.806_65, None, 0.1)
+    }
+
+    #[test]
+    fn fewer_pieces_leave_the_scatter_under_a_factor() {
+        let factors: Vec<f64> = BANK.iter().filter_map(|h| h.factor).collect();
+        for rate in [0.3, 2.0, 9.0] {
+            let segment = segment(rate);
+            let joined = segment.joined(FARTHEST);
+            assert!(joined.pieces.len() < segment.pieces.len(), "{rate}");
+            let secs = |segment: &Segment| segment.pieces.iter().map(|p| p.secs).sum::<f64>();
+            assert!((secs(&joined) - secs(&segment)).abs() < 1e-9);
+            for (found, factor) in segment.scatters_times(&factors).iter().zip(&factors) {
+                let map = Matrix3::from_diagonal_element(*factor);
+                let all = segment.scatter::<3>(&map, &[], &Vector3::zeros());
+                let off = (found.s.sqrt() - all.s.sqrt()).abs();
+                assert!(
+                    off < 3e-3,
+                    "{rate}, {factor}: {off} g of {} g",
+                    all.s.sqrt()
+                );
+            }
+        }
+        // Whoever turns farther than that in every block keeps all of them.
+        let (fast, each) = (segment(40.0), 40.0 * 0.02);
+        let joined = fast.joined(0.1 * each).pieces.len();
+        assert!(joined > fast.pieces.len() * 3 / 4, "{joined}");
     }
 
     #[test]
