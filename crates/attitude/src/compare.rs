@@ -19,6 +19,7 @@ pub(crate) mod matching;
 mod reference;
 mod relative;
 mod statistics;
+mod turn_ratio;
 
 pub use align::{Align, ParseAlignError};
 pub use body_axes::{BodyAxesFit, fit_body_axes};
@@ -27,6 +28,7 @@ pub use constant_bias::{BiasFit, fit_constant_bias};
 pub use reference::Reference;
 pub use relative::RelativeError;
 pub use statistics::{Drift, ErrorStats};
+pub use turn_ratio::turn_ratio;
 
 use crate::frames::{Body, Nav};
 use crate::quaternion::{Quaternion, RotationVector};

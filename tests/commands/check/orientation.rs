@@ -273,3 +273,73 @@ fn info_says_what_may_correct_the_attitude_from_file_and_pipe_alike() {
     let replayed = strapd(dir.path(), "replay log.ndjson -o null: --json --aid auto");
     assert_eq!(replayed.json()["topics"][0]["aid"], Value::Null);
 }
+
+/// A minute of a gyro alone at 100 Hz, of a motion of this size, beside its orientation; exact but for the factor of its
+/// rates.
+fn gyro_alone(dir: &Path, size: f64, factor: f64) {
+    let mut motion = BandLimited::random(7, size, 1.5, 6).unwrap();
+    let mut table = String::from("stamp_ns,gyro_x,gyro_y,gyro_z,qw,qx,qy,qz\n");
+    for k in 0..60 * HZ {
+        let nanos = k * 1_000_000_000 / HZ;
+        let spin = motion.at_nanos(nanos as u64);
+        let rate: [f64; 3] = (spin.w_nb_b * factor).into();
+        let numbers = rate.into_iter().chain(spin.q_nb.normalised().wxyz());
+        let cells: Vec<String> = numbers.map(|number| number.to_string()).collect();
+        table += &format!("{},{}\n", START + nanos, cells.join(","));
+    }
+    std::fs::write(dir.join("gyro.csv"), table).unwrap();
+}
+
+/// Code, severity and first advice of what is wrong in the log by these flags.
+fn wrong(dir: &Path, flags: &str) -> Vec<[String; 3]> {
+    let ran = strapd(dir, &format!("check gyro.csv --json {flags}"));
+    let json: Value = serde_json::from_str(&ran.out).unwrap();
+    let word = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let findings = json["findings"].as_array().unwrap().iter();
+    findings
+        .map(|f| [&f["code"], &f["severity"], &f["flags"]].map(word))
+        .filter(|[_, severity, _]| severity != "note")
+        .collect()
+}
+
+#[test]
+fn an_orientation_tells_the_unit_of_a_gyro_without_an_accelerometer() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    gyro_alone(at, 0.8, 1.0);
+    assert_eq!(wrong(at, ""), Vec::<[String; 3]>::new());
+    let cure = ["gyro-scale", "error", "--gyro-unit rad, or --mend"];
+    for unit in ["deg", "mrad"] {
+        assert_eq!(wrong(at, &format!("--gyro-unit {unit}")), [cure]);
+        let mended = wrong(at, &format!("--gyro-unit {unit} --mend"));
+        assert_eq!(mended, Vec::<[String; 3]>::new());
+    }
+    // Degrees of a motion so slow that nobody doubts their size.
+    gyro_alone(at, 0.05, 1_f64.to_degrees());
+    let cure = ["gyro-scale", "error", "--gyro-unit deg, or --mend"];
+    assert_eq!(wrong(at, ""), [cure]);
+}
+
+#[test]
+fn an_orientation_that_turns_as_far_refutes_a_scale_that_accelerations_look_like() {
+    let dir = tempfile::tempdir().unwrap();
+    let runner = "simulate running --worn foot --duration 120 --rate-hz 100 --seed 843";
+    strapd(
+        dir.path(),
+        &format!("{runner} --noise consumer_mems -o gyro.csv"),
+    )
+    .done();
+    let is_scale = |found: &[String; 3]| found[0] == "gyro-scale";
+    assert!(!wrong(dir.path(), "").iter().any(is_scale));
+    // Without it the accelerometer is believed.
+    let named = "--columns orientation=none";
+    assert!(wrong(dir.path(), named).iter().any(is_scale));
+}
+
+#[test]
+fn a_meaning_that_is_certain_is_the_only_cause_that_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    gyro_alone(dir.path(), 0.8, 1.0);
+    let cure = ["sample-kind", "error", "--sample-kind rate"];
+    assert_eq!(wrong(dir.path(), "--sample-kind delta-angle"), [cure]);
+}

@@ -20,6 +20,9 @@ pub enum GyroUnit {
 }
 
 impl GyroUnit {
+    /// Every unit.
+    pub const ALL: [GyroUnit; 3] = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad];
+
     /// Multiply by this to get rad/s (or rad).
     #[must_use]
     pub fn to_rad(self) -> f64 {

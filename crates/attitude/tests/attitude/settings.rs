@@ -105,7 +105,7 @@ fn words_are_the_names_of_what_they_set_and_none_is_left_out() {
         assert_eq!(plan("sample_kind", kind.name()).kind, Some(kind));
     }
     assert_eq!(words("sample_kind").count(), SampleKind::ALL.len());
-    for unit in [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad] {
+    for unit in GyroUnit::ALL {
         assert_eq!(plan("gyro_unit", unit.name()).unit, Some(unit));
     }
     for policy in [OnGap::Hold, OnGap::Bridge, OnGap::Reset] {

@@ -1,6 +1,6 @@
 //! A recorded orientation, and what it says about the samples -> findings. Pure.
 
-use super::{Finding, Severity};
+use super::{Finding, Severity, sensors};
 use crate::inspection::CheckedTopic;
 use crate::summary::against::{
     axes_json, axes_words, beyond_sigma, bias_json, bias_words, consistency_json, removing, resets,
@@ -15,6 +15,13 @@ use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_K
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
+/// A meaning explains what a unit might when its median error is below this share of the other's.
+const FOLLOWS: f64 = 0.5;
+/// A meaning is certain when its median error over 1 s is below this share of the other's, which is above so many degrees.
+const CERTAINLY: f64 = 0.2;
+const LOST: f64 = 5.0;
+/// Share by which the gyro may turn farther than an orientation that its scale agrees with.
+const SAME_SCALE: f64 = 0.1;
 /// A bias explains an error when it leaves less than this share of it.
 const EXPLAINED: f64 = 0.4;
 /// Turns over 1 s above this are a motion, rad (2 degrees).
@@ -30,9 +37,11 @@ const DRIFTED: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Two biases that differ by less than this share are the same.
 const SAME: f64 = 0.3;
 
+/// Code of a meaning of samples that fits better than the one used.
+pub(super) const MEANING: &str = "sample-kind";
 /// Codes of what is said of a recorded orientation: of a log that is examined it is said once it is known for a truth.
 pub(super) const CODES: [&str; 5] = [
-    "sample-kind",
+    MEANING,
     "bias-by-orientation",
     "beyond-sigma",
     "heading-drift",
@@ -56,6 +65,16 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     if let Some(what) = resets(recorded.resets) {
         let note = Finding::new(Severity::Note, "orientation-reset", what);
         out.push(note.with("resets", recorded.resets));
+    }
+    if other_unit(summary).is_some() {
+        // What else it says of the samples follows from that.
+        return;
+    }
+    if let (Some(best), Some(used)) = (best_meaning(&summary.against), used(summary))
+        && is_certain(best, used)
+    {
+        meaning(&summary.against, best, summary.kind.name(), out);
+        return;
     }
     let trusted = is_truth(recorded, is_seen, out);
     let used = summary.kind.name();
@@ -83,6 +102,9 @@ fn of_another_clock() -> Finding {
 /// Findings of a replay about the orientation it was compared with: nothing of its bias if that is no truth.
 pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
     let mut found = Vec::new();
+    if other_unit(summary).is_some() {
+        return found;
+    }
     if let Some(best) = best_meaning(&summary.against) {
         meaning(&summary.against, best, summary.kind.name(), &mut found);
     }
@@ -94,6 +116,35 @@ pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
         told_by_it(summary, recorded, None, &mut found);
     }
     found
+}
+
+/// Whether the orientation follows the gyro by this meaning of a sample, and by the one used it does not at all.
+fn is_certain(best: &Against, used: &Against) -> bool {
+    best.median_deg < CERTAINLY * used.median_deg && used.median_deg > LOST
+}
+
+/// Error over a second by the meaning that was used.
+fn used(summary: &TopicSummary) -> Option<&Against> {
+    let mut rows = summary.against.iter();
+    rows.find(|row| row.kind == summary.kind.name())
+}
+
+/// Whether the orientation turns as far as the gyro does, to a tenth: its rates are of no other scale.
+pub(super) fn agrees_in_scale(summary: &TopicSummary) -> bool {
+    let ratio = summary.recorded.and_then(|recorded| recorded.turn_ratio);
+    ratio.is_some_and(|ratio| (ratio - 1.0).abs() < SAME_SCALE)
+}
+
+/// Finding that the rates are of another unit, where a recorded orientation shows it and no meaning of a sample would.
+pub(super) fn other_unit(summary: &TopicSummary) -> Option<Finding> {
+    let [unit, taken] = summary.recorded?.unit?;
+    let used = summary
+        .against
+        .iter()
+        .find(|r| r.kind == summary.kind.name())?;
+    let best = best_meaning(&summary.against)?;
+    let is_of_meaning = best.median_deg < FOLLOWS * used.median_deg;
+    (!is_of_meaning).then(|| sensors::of_unit(unit, taken))
 }
 
 /// A bias by which the gyro leaves it, and a sigma that does not hold. `at_rest` is the bias that a rest shows.
@@ -245,10 +296,14 @@ fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>)
         "held" => METHOD.to("dcm-left"),
         kind => SAMPLE_KIND.to(kind),
     };
+    let severity = match is_certain(best, current) {
+        true => Severity::Error,
+        false => Severity::Warning,
+    };
     out.push(
         Finding::new(
-            Severity::Warning,
-            "sample-kind",
+            severity,
+            MEANING,
             format!(
                 "taken as {used}, the samples miss the recorded orientation by {} deg over 1 s (median); as {}, by {} deg",
                 significant(current.median_deg, 3),

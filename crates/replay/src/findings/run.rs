@@ -150,7 +150,12 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     let changed = noted.gyro.and_then(|(gyro, plan, _)| {
         stream::axes_changed(gyro, plan, noted.conditioning.first, false)
     });
-    let disagrees = || noted.gyro.and_then(sensors::disagreement);
+    let disagrees = || {
+        let found = noted.gyro.and_then(sensors::disagreement)?;
+        // The motion's own accelerations may look like a scale: an orientation that turns as far is a second witness.
+        let is_refuted = found.code == sensors::SCALE && orientation::agrees_in_scale(summary);
+        (!is_refuted).then_some(found)
+    };
     let leap = noted
         .gyro
         .and_then(|(gyro, ..)| stream::gravity_leap(gyro, noted.conditioning.first, false));
@@ -160,7 +165,11 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             .gyro
             .and_then(|(gyro, ..)| stream::bias_changed(gyro, noted.conditioning.first))
     };
-    let of_gyro = changed.or_else(bias).or_else(disagrees);
+    let by_orientation = || orientation::other_unit(summary);
+    let of_gyro = changed
+        .or_else(bias)
+        .or_else(disagrees)
+        .or_else(by_orientation);
     // A gyro that is wrong against gravity turns against the field, too: the gyro is cured first.
     let is_gyro_sound = of_gyro.is_none() && noted.gyro.is_none_or(|(gyro, ..)| gyro.agrees());
     out.extend(of_gyro);

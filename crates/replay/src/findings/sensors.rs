@@ -3,6 +3,7 @@
 //! Apart from the rules about samples because it needs the samples integrated; what is measured is in
 //! `strapd_attitude::consistency`. A cure is advised where the recording, integrated with it, agrees.
 
+use super::orientation::MEANING;
 use super::samples::COUNTS;
 use super::{Finding, Severity, axes};
 use crate::finding::{GYRO_DEAD, GYRO_EULER_RATES};
@@ -16,7 +17,7 @@ use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 
 /// Codes of the findings here that name a cause.
 pub(super) const AXES: &str = "gyro-axes";
-const SCALE: &str = "gyro-scale";
+pub(super) const SCALE: &str = "gyro-scale";
 const TURNED: &str = "gyro-turned";
 /// Findings that have only a guess where a cause is named.
 const GUESSES: [&str; 3] = ["unit-against-gravity", "unit-degrees", "unit-unknown"];
@@ -308,21 +309,38 @@ fn near(
     named(plan, unit).into_iter().filter(is_near).collect()
 }
 
+/// Unit of the rates, in words.
+fn like(unit: GyroUnit) -> String {
+    format!("they look like {}/s", unit.name())
+}
+
+/// Finding that the gyro turns as far as a recorded orientation does in this unit, and not in the one `taken`.
+pub(super) fn of_unit(unit: GyroUnit, taken: GyroUnit) -> Finding {
+    let factor = unit.to_rad() / taken.to_rad();
+    Finding::new(
+        Severity::Error,
+        SCALE,
+        format!(
+            "gyro and recorded orientation disagree: true rates are about {} of the recorded: {}",
+            significant(factor, 2),
+            like(unit)
+        ),
+    )
+    .with("factor", factor)
+    .advise("in that unit it turns as far as the orientation does")
+    .help([GYRO_UNIT.to(unit.name())])
+}
+
 /// Factors that rates are off by, other than by accident.
 fn named(plan: &EstimationSettings, taken: GyroUnit) -> Vec<Named> {
     let mut all = Vec::new();
     if plan.gyro_scale == [1.0; 3] {
-        let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad];
-        all.extend(
-            units
-                .into_iter()
-                .filter(|unit| *unit != taken)
-                .map(|unit| Named {
-                    factor: unit.to_rad() / taken.to_rad(),
-                    words: format!("they look like {}/s", unit.name()),
-                    cure: GYRO_UNIT.to(unit.name()),
-                }),
-        );
+        let others = GyroUnit::ALL.into_iter().filter(|unit| *unit != taken);
+        all.extend(others.map(|unit| Named {
+            factor: unit.to_rad() / taken.to_rad(),
+            words: like(unit),
+            cure: GYRO_UNIT.to(unit.name()),
+        }));
     }
     for (per_degree, range) in CHIPS {
         let factor = 1_f64.to_radians() / per_degree / taken.to_rad();
@@ -370,6 +388,10 @@ pub(super) fn is_guess(code: &str) -> bool {
 pub(super) fn settle(found: &mut Vec<Finding>) {
     if found.iter().any(|f| f.code == axes::DEAD) {
         found.retain(|f| f.code != axes::SILENT);
+    }
+    let is_meaning = |f: &Finding| f.code == MEANING && f.severity == Severity::Error;
+    if found.iter().any(is_meaning) {
+        found.retain(|f| !GUESSES.contains(&f.code) && !BY_UNIT.contains(&f.code));
     }
     let Some(cause) = found
         .iter()

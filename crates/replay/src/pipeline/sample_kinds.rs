@@ -10,7 +10,7 @@ use crate::summary::{Against, Recorded};
 use std::collections::HashMap;
 use strapd_attitude::compare::{
     Align, Consistency, Reference, Stamped, UncertainAttitude, compare, consistency, fit_body_axes,
-    fit_constant_bias, for_each_error,
+    fit_constant_bias, for_each_error, turn_ratio,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
@@ -19,7 +19,7 @@ use strapd_attitude::estimate::{
 };
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status};
+use strapd_attitude::record::{AttitudeSample, GyroUnit, Nanos, RawSample, SampleKind, Status};
 use strapd_attitude::worlds::{Convention, World};
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
@@ -31,6 +31,9 @@ const ROOMY: usize = 8;
 
 /// Attitudes kept while the samples have brought no orientation yet.
 const BEFORE: usize = 1024;
+
+/// Share by which a ratio of turns may be off that of two units.
+const SAME_UNIT: f64 = 0.15;
 
 /// The meanings tried: name, words, kind, and the method where it is not the run's own.
 const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
@@ -59,6 +62,8 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
 #[derive(Debug)]
 pub(super) struct AgainstRecorded {
     resolved: Meaning,
+    /// Whether the user scaled the rates: their unit is no question then.
+    is_scaled: bool,
     clock: strapd_attitude::condition::Clock,
     own_reference: bool,
     estimators: Vec<Estimator>,
@@ -170,6 +175,7 @@ impl AgainstRecorded {
             .collect::<Result<Vec<_>, _>>()?;
         Ok(AgainstRecorded {
             resolved: resolved.clone(),
+            is_scaled: plan.gyro_scale != [1.0; 3],
             clock: prepared.clock,
             own_reference: true,
             tracks: estimators.iter().map(|_| Thinned::new()).collect(),
@@ -357,11 +363,16 @@ impl AgainstRecorded {
             .filter(|((_, _, kind, _), _)| is_angle(*kind) == is_angle(self.resolved.kind))
             .filter_map(|(_, track)| fit_body_axes(&track.entries, entries))
             .min_by(|a, b| a.turned.total_cmp(&b.turned));
+        let turn_ratio = self
+            .used()
+            .and_then(|track| turn_ratio(&track.entries, self.referred()));
         Some(Recorded {
             usable: entries.len(),
             unusable: self.unusable,
             constant: entries.len() > 1
                 && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
+            turn_ratio,
+            unit: turn_ratio.and_then(|ratio| self.other_unit(ratio)),
             axes: best,
             consistency: consistency(&self.own.entries, self.referred(), self.align, |_| {}),
             bias: self
@@ -370,6 +381,19 @@ impl AgainstRecorded {
             removed: self.removed,
             resets: self.cuts.len(),
         })
+    }
+
+    /// Unit by which the rates turn as far as the recorded orientation, and the one they were taken in.
+    fn other_unit(&self, ratio: f64) -> Option<[GyroUnit; 2]> {
+        if self.is_scaled {
+            return None;
+        }
+        let taken = self.resolved.unit;
+        let off = |unit: &GyroUnit| (ratio * unit.to_rad() / taken.to_rad() - 1.0).abs();
+        let unit = GyroUnit::ALL
+            .into_iter()
+            .find(|unit| off(unit) < SAME_UNIT)?;
+        (unit != taken).then_some([unit, taken])
     }
 
     /// The track of the meaning the run took.

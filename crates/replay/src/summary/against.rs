@@ -5,6 +5,7 @@
 use super::significant;
 use serde_json::{Value, json};
 use strapd_attitude::compare::{Align, BiasFit, BodyAxesFit, Consistency, WithinSigma};
+use strapd_attitude::record::GyroUnit;
 use strapd_attitude::setting::{BIAS, Choice};
 
 /// Error against a recorded orientation for one meaning of a sample.
@@ -31,6 +32,11 @@ pub struct Recorded {
     pub unusable: u64,
     /// All of them are one and the same.
     pub constant: bool,
+    /// Turn of the gyro by that of the orientation; `None` where too few turn, or they do not agree.
+    pub turn_ratio: Option<f64>,
+    /// Unit by which the rates turn as far as it does, and the one they were taken in; `None` where that one, or none,
+    /// does.
+    pub unit: Option<[GyroUnit; 2]>,
     /// Axes of its body relative to the gyro's; `None` = the motion does not tell.
     pub axes: Option<BodyAxesFit>,
     /// Whether the run's errors lie within what it said of them; `None` = no instant in common, or no sigma.

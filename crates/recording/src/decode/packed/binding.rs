@@ -54,7 +54,7 @@ pub fn binding(line: &[u8]) -> Result<(u32, Line), Unbound> {
         Unbound::Object { what, column }
     })?;
     let kinds = SampleKind::ALL.map(|kind| (kind.name(), kind));
-    let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|unit| (unit.name(), unit));
+    let units = GyroUnit::ALL.map(|unit| (unit.name(), unit));
     let head = Line {
         class: Class::Rate,
         id: said.id.as_deref().map(exact_name).transpose()?,
