@@ -327,7 +327,7 @@ pub(super) fn of_unit(unit: GyroUnit, taken: GyroUnit) -> Finding {
         ),
     )
     .with("factor", factor)
-    .advise("in that unit it turns as far as the orientation does")
+    .advise("in that unit the gyro rotates as far as the orientation")
     .help([GYRO_UNIT.to(unit.name())])
 }
 
