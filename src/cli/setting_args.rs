@@ -175,7 +175,10 @@ pub(super) fn words(setting: Setting) -> PossibleValuesParser {
 
 fn possible(row: &'static Row) -> impl Iterator<Item = PossibleValue> {
     let words = row.words.iter();
-    let words = words.map(|word| PossibleValue::new(word.name).help(named(word.meaning)));
+    let words = words.map(|word| {
+        let value = PossibleValue::new(word.name).aliases(word.also);
+        value.help(named(word.meaning))
+    });
     // How what is no word begins, for the completion of shells.
     let others: &'static [&'static str] = match row.takes {
         Takes::Attitude(_) => &["q=", "rpy="],
@@ -243,11 +246,13 @@ mod tests {
         words: &[
             Word {
                 name: "red",
+                also: &["rouge"],
                 meaning: "As fire engines are",
                 set: |plan| plan.max_gap_secs = 1.0,
             },
             Word {
                 name: "blue",
+                also: &[],
                 meaning: "Slow",
                 set: |plan| plan.max_gap_secs = 2.0,
             },
@@ -280,6 +285,7 @@ mod tests {
         };
         assert_eq!(given(&["toy"]).unwrap(), 1.0);
         assert_eq!(given(&["toy", "--delimiter", "BLUE"]).unwrap(), 2.0);
+        assert_eq!(given(&["toy", "--delimiter", "Rouge"]).unwrap(), 1.0);
         let refused = given(&["toy", "--delimiter", "green"]).unwrap_err();
         assert_eq!(refused.kind(), ErrorKind::InvalidValue);
         assert!(refused.to_string().contains("[possible values: red, blue]"));

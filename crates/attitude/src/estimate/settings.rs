@@ -66,6 +66,8 @@ pub enum Default {
 pub struct Word {
     /// Name.
     pub name: &'static str,
+    /// Other spellings that are taken for it.
+    pub also: &'static [&'static str],
     /// Meaning in one line.
     pub meaning: &'static str,
     /// Puts it into a plan.
@@ -304,8 +306,11 @@ impl Row {
     }
 
     fn word(&self, text: &str) -> Option<&Word> {
-        let mut words = self.words.iter();
-        words.find(|word| word.name.eq_ignore_ascii_case(text))
+        let is_meant = |word: &&Word| {
+            let mut spellings = std::iter::once(&word.name).chain(word.also);
+            spellings.any(|spelling| spelling.eq_ignore_ascii_case(text))
+        };
+        self.words.iter().find(is_meant)
     }
 
     fn quaternion<To, From>(&self, text: &str) -> Result<Quaternion<To, From>, Diagnostic> {

@@ -18,7 +18,20 @@ use crate::setting::*;
 use crate::worlds::World;
 
 const fn word(name: &'static str, meaning: &'static str, set: fn(&mut EstimationSettings)) -> Word {
-    Word { name, meaning, set }
+    Word {
+        name,
+        also: &[],
+        meaning,
+        set,
+    }
+}
+
+impl Word {
+    /// The same with other spellings.
+    const fn or(mut self, also: &'static [&'static str]) -> Word {
+        self.also = also;
+        self
+    }
 }
 
 /// A number without words before it.
@@ -263,9 +276,9 @@ pub static ROWS: [Row; 38] = [
         environment: Some("STRAPD_GYRO_UNIT"),
         placeholder: "GYRO_UNIT",
         words: &[
-            word(GyroUnit::Rad.name(), "rad/s", |p| p.unit = Some(GyroUnit::Rad)),
-            word(GyroUnit::Deg.name(), "deg/s", |p| p.unit = Some(GyroUnit::Deg)),
-            word(GyroUnit::Mrad.name(), "mrad/s", |p| p.unit = Some(GyroUnit::Mrad)),
+            word(GyroUnit::Rad.name(), "rad/s", |p| p.unit = Some(GyroUnit::Rad)).or(&["rad/s"]),
+            word(GyroUnit::Deg.name(), "deg/s", |p| p.unit = Some(GyroUnit::Deg)).or(&["deg/s", "dps"]),
+            word(GyroUnit::Mrad.name(), "mrad/s", |p| p.unit = Some(GyroUnit::Mrad)).or(&["mrad/s"]),
         ],
         ..ROW
     },
