@@ -3,26 +3,31 @@
 //! Apart from the rows because here, once, it is decided and said what numbers mean: nothing of it is guessed in
 //! silence, and what cannot be told ends with the flag that tells it.
 
+mod candidates;
+mod chosen;
+mod header;
 mod increments;
 mod instants;
+mod refusal;
 mod roles;
 mod sensor_log;
 mod sensors;
 
 use super::column::{Column, is_comment};
-use super::preamble::{Maker, Preamble};
+use super::preamble::Preamble;
 use super::rows::{LOST, Table};
-use crate::columns::Delimiter;
-use crate::columns::{Columns, Role, RowFilter, RowSelection};
-use crate::columns::{Kind, Meant, Name};
-use crate::columns::{Quantity, Unit};
+use crate::columns::{Columns, Delimiter, RowFilter, RowSelection};
+use crate::columns::{Meant, Name, Quantity, Unit};
 use crate::decode::{Options, Wanted};
 use crate::text::printable;
 use crate::text::without_mark;
+use header::{File, header_in, names_in};
 use roles::Roles;
 use std::collections::BTreeMap;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::setting::{COLUMNS, DELIMITER};
+use strapd_attitude::setting::DELIMITER;
+
+pub(crate) use header::{is_header, is_text_of_cells, may_be_table};
 
 /// Lines, and bytes of them, in which the header is looked for.
 pub(crate) const MOST_HEAD_LINES: usize = 200;
@@ -31,117 +36,6 @@ const MOST_HEAD: usize = 64 << 10;
 const OPENING: usize = 24;
 /// A line of more cells is no header.
 const MOST_COLUMNS: usize = 1024;
-/// Names that an error repeats.
-const MOST_SAID: usize = 16;
-
-/// Whether a line names the columns of a table of rates or orientations.
-pub(crate) fn is_header(line: &[u8], given: Option<&Columns>) -> bool {
-    header_in(line, None, given, &File::default()).is_some()
-}
-
-/// Whether it is text of which some line has three cells or more, and no lines of objects.
-pub(crate) fn is_text_of_cells(first: &[u8]) -> bool {
-    let cells = |line: &[u8]| {
-        let of = |separator: u8| line.iter().filter(|b| **b == separator).count();
-        b"\t,;|".iter().map(|separator| of(*separator)).max()
-    };
-    let mut lines = without_mark(first).split(|b| *b == b'\n');
-    may_be_table(first) && lines.any(|line| cells(line) >= Some(2))
-}
-
-/// Whether it is text without lines of objects: the header of a table may yet come.
-pub(crate) fn may_be_table(first: &[u8]) -> bool {
-    let text = without_mark(first);
-    let binary = |b: &u8| *b < b' ' && !b"\t\r\n".contains(b);
-    let is_object = |line: &[u8]| matches!(line.trim_ascii_start().first(), Some(b'{' | b'['));
-    !text.is_empty() && !text.iter().any(binary) && !text.split(|b| *b == b'\n').any(is_object)
-}
-
-/// The names of a line, cut by this delimiter; none of what can be no header.
-fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
-    let row = delimiter.row(without_mark(line));
-    let binary = |b: &u8| *b < b' ' && *b != b'\t';
-    let is_object = row.windows(2).any(|pair| pair == b"\":");
-    if is_object || row.iter().any(binary) {
-        return Vec::new();
-    }
-    // Between blanks a mark of comments would be a cell.
-    let row = match (delimiter, row) {
-        (Delimiter::Blanks, [b'#' | b'%', rest @ ..] | [b'/', b'/', rest @ ..]) => {
-            rest.trim_ascii_start()
-        }
-        _ => row,
-    };
-    let mut names: Vec<Name> = Vec::new();
-    for cell in delimiter.cells(row) {
-        if names.len() == MOST_COLUMNS {
-            return Vec::new();
-        }
-        names.push(Name::of(&cell));
-    }
-    while names.last().is_some_and(|name| name.text.is_empty()) {
-        names.pop();
-    }
-    names
-}
-
-/// Facts about a file before its header.
-#[derive(Default)]
-struct File<'f> {
-    /// Name, without the ending.
-    stem: &'f str,
-    /// Purpose of its reading.
-    wanted: Wanted,
-    maker: Maker,
-}
-
-/// Delimiter by which a line is a header.
-fn header_in(
-    line: &[u8],
-    delimiter: Option<Delimiter>,
-    given: Option<&Columns>,
-    file: &File<'_>,
-) -> Option<Delimiter> {
-    let tried = delimiter.as_slice();
-    let tried = if tried.is_empty() {
-        &Delimiter::TRIED
-    } else {
-        tried
-    };
-    tried.iter().copied().find(|delimiter| {
-        let names = names_in(line, *delimiter);
-        names.len() >= 3 && names_something(&names, given, file)
-    })
-}
-
-/// Whether these names are those of a table of rates or orientations; of one beside such a table, of forces or fields.
-fn names_something(names: &[Name], given: Option<&Columns>, file: &File<'_>) -> bool {
-    let given = given.map(Columns::all).unwrap_or_default();
-    let columns = || given.iter().flat_map(|given| &given.columns);
-    // Numbers alone tell no header.
-    if columns().next().is_some() && columns().all(|column| number(column).is_some()) {
-        return false;
-    }
-    let are_there = columns().all(|column| roles::place(names, column).is_ok());
-    let is_given = given.iter().any(|given| {
-        matches!(
-            given.role,
-            Role::Of(Kind::Gyro | Kind::Turn | Kind::Orientation)
-        ) && !given.columns.is_empty()
-    });
-    let kinds: &[Kind] = match file.wanted {
-        Wanted::Rates => &[Kind::Gyro, Kind::Turn, Kind::Orientation, Kind::Matrix],
-        Wanted::Forces | Wanted::Fields => &[Kind::Accel, Kind::Mag],
-        Wanted::Temperatures => &[],
-    };
-    are_there
-        && (is_given
-            || roles::axes_of_maker(names, file.maker, Kind::Gyro).is_some()
-            || kinds.iter().any(|kind| {
-                !roles::candidates(names, *kind).is_empty()
-                    || roles::bare_axes(names, file.stem, *kind).is_some()
-            }))
-}
 
 /// A column's number, from 1.
 fn number(column: &str) -> Option<usize> {
@@ -373,84 +267,6 @@ impl Opening {
             first.retain(|row| selection.has(row));
         }
         Ok(selection)
-    }
-
-    /// Refusal of a text without a header: what there is, and what would help.
-    fn nothing(&self) -> Diagnostic {
-        let start = self.lines.first().map_or(&[][..], Vec::as_slice);
-        if self.lines.iter().flatten().any(|b| *b == 0) {
-            return Diagnostic::new(
-                "it holds bytes of zero: it is binary, or UTF-16 without its mark",
-            )
-            .help("iconv -f UTF-16LE -t UTF-8 FILE > log.csv, if it is text");
-        }
-        // The line with the most names.
-        let texts = |names: &[Name]| names.iter().filter(|name| !is_number(&name.text)).count();
-        let best = self
-            .lines
-            .iter()
-            .filter_map(|line| {
-                let mut tried = self.delimiter.into_iter().chain(Delimiter::TRIED);
-                tried.find_map(|delimiter| {
-                    Some(names_in(line, delimiter)).filter(|names| names.len() >= 3)
-                })
-            })
-            .filter(|names| texts(names) > 0)
-            .max_by_key(|names| texts(names));
-        let Some(names) = best else {
-            return Diagnostic::new(format!(
-                "none of its first lines has three cells that could name columns; it begins with `{}`",
-                crate::text::snippet(start)
-            ))
-            .help(format!(
-                "a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or {COLUMNS} gyro=2:3:4,stamp=1:s by numbers, and {DELIMITER}"
-            ));
-        };
-        let all: Vec<&str> = names.iter().map(|name| name.text.as_str()).collect();
-        let said = all
-            .get(..all.len().min(MOST_SAID))
-            .unwrap_or(&all)
-            .join("`, `");
-        self.unnamed(&names, &all, &said)
-    }
-
-    /// Refusal of columns with names of which none is a rate; `all` are the names, `said` as many as are quoted.
-    fn unnamed(&self, names: &[Name], all: &[&str], said: &str) -> Diagnostic {
-        if let Some(given) = self.given.as_ref().map(Columns::all) {
-            let wrong = given.iter().flat_map(|given| &given.columns);
-            let wrong: Vec<String> = wrong
-                .filter_map(|column| roles::place(names, column).err())
-                .collect();
-            if let Some(first) = wrong.first() {
-                return format!("{COLUMNS}: {first}; its columns are `{said}`").into();
-            }
-        }
-        let axes = ["x", "y", "z"];
-        if axes
-            .iter()
-            .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
-        {
-            return Diagnostic::new(
-                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope... or AngularVelocity)",
-            )
-            .help(format!(
-                "{COLUMNS} gyro=x:y:z if they are rates"
-            ));
-        }
-        let aside = names.iter().find_map(|name| match name.meant {
-            Meant::Aside {
-                kind: Kind::Gyro,
-                why,
-            } => Some(format!("; `{}` {why}", name.text)),
-            _ => None,
-        });
-        Diagnostic::new(format!(
-            "none of its columns names a rate about x, y and z, or a quaternion: `{said}`{}",
-            aside.unwrap_or_default()
-        ))
-        .help(format!(
-            "{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1); of attitudes orientation=W:X:Y:Z"
-        ))
     }
 }
 

@@ -2,22 +2,24 @@
 //!
 //! Apart from the layout because that is decided once, and this is done for every row.
 
+mod cells;
+mod facts;
+
 use super::clock::Clock;
 use super::column::{Column, is_comment};
 use super::layout;
 use super::own;
 use super::preamble;
 use crate::columns::{Columns, Delimiter, RowSelection, bits};
-use crate::decimal;
 use crate::decode::{Class, Line, MAX_LINE, Undecodable, exact_name};
 use crate::text::{printable, snippet, without_mark};
+use cells::Read;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::borrow::Cow;
 use std::sync::Arc;
 use strapd_attitude::frames::Sensor;
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
-use strapd_attitude::setting::{GYRO_SCALE, GYRO_UNIT};
+use strapd_attitude::record::{Declared, RawSample};
 
 /// Columns that make a table one of samples or of attitudes.
 const GYRO: [Column; 3] = [Column::Gyro(0), Column::Gyro(1), Column::Gyro(2)];
@@ -185,89 +187,9 @@ impl Table {
         }
     }
 
-    /// Whether strapd wrote it.
-    #[must_use]
-    pub fn is_own(&self) -> bool {
-        self.whose != Whose::Others
-    }
-
-    /// The `--columns` that say how it is read; empty of strapd's own.
-    #[must_use]
-    pub fn assumed(&self) -> &str {
-        &self.assumed
-    }
-
-    /// Rows that are read, and the count of those that are not.
-    #[must_use]
-    pub(crate) fn selection(&self) -> &RowSelection {
-        &self.selection
-    }
-
-    /// Name of the columns that tell the sensors of a table apart; `None` where there are none.
-    #[must_use]
-    pub(crate) fn sensor_column(&self) -> Option<String> {
-        let columns = self.columns.iter();
-        let named: Vec<&str> = columns
-            .filter(|(column, _)| *column == Some(Column::Id))
-            .map(|(_, name)| name.as_str())
-            .collect();
-        (!named.is_empty()).then(|| named.join(", "))
-    }
-
     /// The names of its columns.
     pub(super) fn names(&self) -> Vec<&str> {
         self.columns.iter().map(|(_, name)| name.as_str()).collect()
-    }
-
-    /// Notes for its reader: what was taken for granted, what is not used.
-    #[must_use]
-    pub fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    /// Warning to give if nobody states the unit of its rates.
-    #[must_use]
-    pub(crate) fn doubt_of_unit(&self) -> Option<String> {
-        let is_open = !self.is_own() && self.has_rate() && self.declared.gyro_unit.is_none();
-        is_open.then(|| {
-            format!("the unit of the rates is not stated, and taken for rad/s: {GYRO_UNIT} or {GYRO_SCALE} states another")
-        })
-    }
-
-    /// Meaning of its numbers that its names declare.
-    #[must_use]
-    pub fn declared(&self) -> &Declared {
-        &self.declared
-    }
-
-    /// Whether anything says when its rows were measured.
-    #[must_use]
-    pub(crate) fn has_stamps(&self) -> bool {
-        self.clock != Clock::Nothing
-    }
-
-    /// Whether rows have a place for a rate.
-    #[must_use]
-    pub fn has_rate(&self) -> bool {
-        self.has(GYRO[0]) || self.has(Column::Turn(0))
-    }
-
-    /// Whether rows have a place for a specific force.
-    #[must_use]
-    pub fn has_force(&self) -> bool {
-        self.has(Column::Accel(0))
-    }
-
-    /// Whether rows have a place for a magnetic field.
-    #[must_use]
-    pub fn has_field(&self) -> bool {
-        self.has(Column::Mag(0))
-    }
-
-    /// Whether rows have a place for an orientation.
-    #[must_use]
-    pub(crate) fn has_orientation(&self) -> bool {
-        self.has(Column::Orientation(0))
     }
 
     pub(super) fn has(&self, column: Column) -> bool {
@@ -531,167 +453,6 @@ fn quaternion(rows: &[f64; 9]) -> [f64; 4] {
 fn rotation_vector(wxyz: [f64; 4]) -> [f64; 3] {
     let turn = Quaternion::<Sensor, Sensor>::try_from_wxyz(wxyz);
     turn.map_or([f64::NAN; 3], |turn| turn.rotation_vector().0.into())
-}
-
-/// Contents of a row.
-#[derive(Default)]
-struct Read {
-    stamp: Option<Nanos>,
-    day: Option<Nanos>,
-    log: Option<Nanos>,
-    interval: Option<i64>,
-    kind: Option<SampleKind>,
-    id: Option<String>,
-    gyro: [Option<f64>; 3],
-    accel: [Option<f64>; 3],
-    mag: [Option<f64>; 3],
-    orientation: [Option<f64>; 4],
-    turn: [Option<f64>; 4],
-    matrix: [Option<f64>; 9],
-    temperature: Option<f64>,
-    /// Numbers of gyro, accel and mag that a word says are not there.
-    nulls: [u8; 3],
-}
-
-impl Read {
-    /// Drops the vectors of which a word says that they are not there, in a row that has a number of another sensor:
-    /// joined tables have rows of each.
-    fn without_nulls(mut self) -> Read {
-        let mut vectors = [&mut self.gyro, &mut self.accel, &mut self.mag];
-        let is_there = |vector: &&mut [Option<f64>; 3]| {
-            let is_number = |value: &Option<f64>| value.is_some_and(|value| !value.is_nan());
-            vector.iter().all(is_number)
-        };
-        if vectors.iter().any(is_there) {
-            for (vector, nulls) in vectors.iter_mut().zip(self.nulls) {
-                if nulls == 3 {
-                    **vector = [None; 3];
-                }
-            }
-        }
-        self
-    }
-
-    #[inline]
-    fn take(
-        &mut self,
-        column: Column,
-        cell: &[u8],
-        commas: bool,
-        clock: &mut Clock,
-    ) -> Result<(), &'static str> {
-        if cell.is_empty() {
-            return Ok(());
-        }
-        if let Some(value) = bits::read(cell) {
-            if let Some(place) = self.place_of(column) {
-                *place = Some(value);
-                return Ok(());
-            }
-            return self.take(column, &bits::spelled(cell), commas, clock);
-        }
-        if let Some(value) = decimal::alone(cell)
-            && let Some(place) = self.place_of(column)
-        {
-            *place = Some(value);
-            return Ok(());
-        }
-        let mut pointed = [0; MOST_DIGITS];
-        let cell = match commas && cell.contains(&b',') {
-            true => with_point(cell, &mut pointed).ok_or("is no number")?,
-            false => cell,
-        };
-        let text = std::str::from_utf8(cell).map_err(|_| "is not UTF-8")?;
-        let whole = || text.parse::<i64>().map_err(|_| "is no whole number");
-        if let Some(place) = self.place_of(column) {
-            *place = match column {
-                // No sample is lost for want of one.
-                Column::Temperature => number(text).ok(),
-                _ => Some(number(text)?),
-            };
-            if is_null(text) {
-                self.count_null(column);
-            }
-            return Ok(());
-        }
-        match column {
-            Column::Stamp if is_absent(text) => {}
-            Column::Stamp => self.stamp = Some(clock.read(text)?),
-            Column::Date if is_absent(text) => {}
-            Column::Date => self.day = Some(clock.day(text)?),
-            Column::Log => self.log = Some(Nanos(whole()?)),
-            Column::Interval => self.interval = Some(whole()?),
-            Column::Kind => {
-                let kind = SampleKind::named(text);
-                self.kind = Some(kind.ok_or("is none of rate, average, delta-angle, rotation")?);
-            }
-            // Where several columns name it, by all of them.
-            Column::Id => {
-                self.id = Some(match self.id.take() {
-                    Some(before) => format!("{before}/{text}"),
-                    None => text.to_owned(),
-                });
-            }
-            // A number, which has a place.
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn count_null(&mut self, column: Column) {
-        let [gyro, accel, mag] = &mut self.nulls;
-        match column {
-            Column::Gyro(_) => *gyro += 1,
-            Column::Accel(_) => *accel += 1,
-            Column::Mag(_) => *mag += 1,
-            _ => {}
-        }
-    }
-
-    /// Place of the number in a column, if the column holds plain numbers.
-    #[inline]
-    fn place_of(&mut self, column: Column) -> Option<&mut Option<f64>> {
-        match column {
-            Column::Gyro(axis) => self.gyro.get_mut(axis),
-            Column::Accel(axis) => self.accel.get_mut(axis),
-            Column::Mag(axis) => self.mag.get_mut(axis),
-            Column::Orientation(part) => self.orientation.get_mut(part),
-            Column::Turn(part) => self.turn.get_mut(part),
-            Column::Matrix(part) => self.matrix.get_mut(part),
-            Column::Temperature => Some(&mut self.temperature),
-            _ => None,
-        }
-    }
-}
-
-/// Digits of a number with a decimal comma.
-const MOST_DIGITS: usize = 64;
-
-/// The number with a point where it has its comma.
-fn with_point<'b>(cell: &[u8], buffer: &'b mut [u8; MOST_DIGITS]) -> Option<&'b [u8]> {
-    let out = buffer.get_mut(..cell.len())?;
-    for (to, from) in out.iter_mut().zip(cell) {
-        *to = if *from == b',' { b'.' } else { *from };
-    }
-    Some(out)
-}
-
-/// Words for a number that is not there. Of a vector it is one that is not finite: it is counted, not passed over.
-fn is_absent(text: &str) -> bool {
-    is_null(text) || text.eq_ignore_ascii_case("nan")
-}
-
-/// Words for no number, which is another thing than one that is none.
-fn is_null(text: &str) -> bool {
-    ["null", "-", "NA", "N/A", "n/a", "None"].contains(&text)
-}
-
-#[inline]
-fn number(text: &str) -> Result<f64, &'static str> {
-    text.parse::<f64>().or_else(|_| match is_absent(text) {
-        true => Ok(f64::NAN),
-        false => Err("is no number"),
-    })
 }
 
 #[cfg(test)]

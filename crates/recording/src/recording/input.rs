@@ -1,9 +1,10 @@
 //! A file, a folder, an archive, a pipe or standard input -> what can be read as often as is needed. I/O.
 //!
 //! Apart from the log because it comes before anything is known of one: where the bytes are, and what they are. What
-//! comes
-//! only once is put into a file of its own that has no name and goes with this process: who looks twice sees the same
-//! bytes, and what is said of a log does not depend on how it came.
+//! comes only once is put into a file of its own that has no name and goes with this process: who looks twice sees the
+//! same bytes, and what is said of a log does not depend on how it came.
+
+mod stream;
 
 use super::archive::{self, Unpacked};
 use super::folder::{self, Folder};
@@ -21,7 +22,7 @@ use crate::mcap::Reader;
 use crate::parquet::{Rows, Trouble};
 use crate::remote_object::{self, Object, ObjectBytes, RemoteSource};
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -300,60 +301,6 @@ impl Input {
         Input::keep(Source::File(name.to_owned()), from, warn)
     }
 
-    fn keep(source: Source, mut from: impl Read, warn: &Warn) -> Result<Input> {
-        let name = source.name();
-        let mut file = tempfile::tempfile().map_err(|e| no_room(&name, &e))?;
-        let mut block = vec![0; 1 << 18];
-        let mut head = Vec::new();
-        let mut have = 0;
-        loop {
-            let read = match from.read(&mut block) {
-                Ok(0) => break,
-                Ok(read) => read,
-                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
-                Err(source) => {
-                    return Err(Error::Read {
-                        path: name,
-                        offset: have,
-                        source,
-                    });
-                }
-            };
-            let room = usize::try_from(MOST - have).unwrap_or(usize::MAX);
-            let taken = block.get(..read.min(room)).unwrap_or_default();
-            let wanted = crate::format::HEAD.saturating_sub(head.len());
-            head.extend_from_slice(taken.get(..wanted.min(taken.len())).unwrap_or_default());
-            file.write_all(taken).map_err(|e| no_room(&name, &e))?;
-            have += taken.len() as u64;
-            if taken.len() < read {
-                warn.say(&format!(
-                    "{}: only the first {} GiB were looked at; save it to a file to look at all of it",
-                    name.display(),
-                    MOST >> 30
-                ));
-                break;
-            }
-        }
-        if have == 0 {
-            return Err(Error::Empty { path: name });
-        }
-        let named = || Format::of_name(&name);
-        Ok(Input {
-            format: Format::of_bytes(&head)
-                .or_else(named)
-                .or_else(|| Format::of_shape(&head))
-                .unwrap_or(Format::Mcap),
-            kept: Some(Rereadable::File(Arc::new(file))),
-            source,
-            name,
-            beside: Vec::new(),
-            orientation: None,
-            parts: Vec::new(),
-            unpacked: None,
-            warn: warn.clone(),
-        })
-    }
-
     /// Source it came from.
     #[must_use]
     pub fn source(&self) -> &Source {
@@ -517,15 +464,4 @@ fn checked(path: &Path, format: Option<Format>, warn: &Warn) -> Format {
 /// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
 pub fn is_pipe(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
-}
-
-fn no_room(name: &Path, why: &std::io::Error) -> Error {
-    Error::Unsupported {
-        path: name.to_owned(),
-        what: Diagnostic::new(format!(
-            "what comes only once is kept in {} to be looked at twice: {why}",
-            std::env::temp_dir().display()
-        ))
-        .help("TMPDIR=FOLDER with room, or save it to a file first"),
-    }
 }

@@ -4,8 +4,9 @@
 //! all of how long it took.
 
 use super::super::clock::Clock;
+use super::candidates::place;
 use super::instants::Instants;
-use super::roles::{RoleColumns, Roles, place};
+use super::roles::{RoleColumns, Roles};
 use crate::columns::{Kind, Meant, Role, Unit};
 use crate::decode::{Bare, bare_of_text, units_of_steps};
 use strapd_attitude::diagnostic::Diagnostic;

@@ -1,8 +1,9 @@
 //! Names, units and first rows -> which column is what, or why that cannot be told. Pure.
 
 use super::super::column::Column;
-use super::super::preamble::{Maker, Preamble};
+use super::super::preamble::Preamble;
 use super::super::rows::{Scales, Table};
+use super::candidates::place;
 use super::instants::Instants;
 use super::{columns, is_number, number};
 use crate::columns::Delimiter;
@@ -10,7 +11,6 @@ use crate::columns::Unit;
 use crate::columns::{Columns, Given, Role};
 use crate::columns::{Kind, Meant, Name};
 use crate::decode::Wanted;
-use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::frames::BodyAxes;
@@ -30,13 +30,6 @@ pub(super) struct Roles<'l> {
     pub(super) are_stamps_unread: bool,
 }
 
-/// Columns that may be a vector.
-pub(super) struct Group {
-    pub(super) columns: Vec<usize>,
-    /// A column of which there is another of the same meaning.
-    twice: Option<[usize; 2]>,
-}
-
 /// Columns that are one.
 pub(super) struct RoleColumns {
     pub(super) columns: Vec<usize>,
@@ -52,97 +45,6 @@ struct Fillings {
     matrix: Option<RoleColumns>,
     turn: Option<RoleColumns>,
     push: Option<RoleColumns>,
-}
-
-/// Index of a column that the user names, or gives by its number from 1.
-pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
-    let all = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
-        let each = names.iter().enumerate();
-        each.filter(|(_, name)| is(&name.text))
-            .map(|(at, _)| at)
-            .collect()
-    };
-    let mut found = all(&|name| name == column);
-    if found.is_empty() {
-        found = all(&|name| name.eq_ignore_ascii_case(column));
-    }
-    match (found.as_slice(), number(column)) {
-        ([one], _) => Ok(*one),
-        ([], Some(n)) if n <= names.len() => Ok(n - 1),
-        ([], Some(n)) => Err(format!("there is no column {n} of {}", names.len())),
-        ([], None) => {
-            let column = crate::text::printable(column);
-            Err(format!("there is no column `{column}`"))
-        }
-        ([first, second, ..], _) => Err(format!(
-            "`{}` is there more than once, as columns {} and {}: give its number",
-            crate::text::printable(column),
-            first + 1,
-            second + 1
-        )),
-    }
-}
-
-/// Every vector of this kind of which all parts are there.
-pub(super) fn candidates(names: &[Name], kind: Kind) -> Vec<Group> {
-    let mut groups: BTreeMap<&str, Vec<Vec<usize>>> = BTreeMap::new();
-    for (at, name) in names.iter().enumerate() {
-        if let Meant::Part {
-            kind: of_kind,
-            part,
-            of,
-        } = &name.meant
-            && *of_kind == kind
-        {
-            let parts = groups
-                .entry(of)
-                .or_insert_with(|| vec![Vec::new(); kind.parts()]);
-            if let Some(part) = parts.get_mut(*part) {
-                part.push(at);
-            }
-        }
-    }
-    let group = |parts: Vec<Vec<usize>>| {
-        let columns: Option<Vec<usize>> = parts.iter().map(|part| part.first().copied()).collect();
-        let twice = parts.iter().find_map(|part| match part.as_slice() {
-            [first, second, ..] => Some([*first, *second]),
-            _ => None,
-        });
-        Some(Group {
-            columns: columns?,
-            twice,
-        })
-    };
-    groups.into_values().filter_map(group).collect()
-}
-
-/// Sensor Logger and its like: bare axes beside a stamp are what a file of that name holds. MATLAB's phone logs have
-/// the second name, and no other word in it: what is called so and more is another thing.
-pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<usize>> {
-    let (stems, whole): (&[&str], &str) = match kind {
-        Kind::Gyro => (&["gyroscope"], "angularvelocity"),
-        Kind::Accel => (&["totalacceleration", "accelerometer"], "acceleration"),
-        Kind::Mag => (&["magnetometer"], "magneticfield"),
-        Kind::Orientation | Kind::Matrix | Kind::Turn | Kind::Push => return None,
-    };
-    let stem = stem.to_lowercase();
-    let is_whole = stem
-        .strip_prefix(whole)
-        .is_some_and(|rest| !rest.contains(char::is_alphabetic));
-    let is_it = is_whole || stems.iter().any(|of_kind| stem.starts_with(of_kind));
-    if !is_it {
-        return None;
-    }
-    names.iter().find(|name| name.meant == Meant::Stamp)?;
-    let axis = |axis: &str| place(names, axis).ok();
-    ["x", "y", "z"].into_iter().map(axis).collect()
-}
-
-/// The rates of a `.gcsv`, which only its first line tells: elsewhere `rx` is an angle as well.
-pub(super) fn axes_of_maker(names: &[Name], maker: Maker, kind: Kind) -> Option<Vec<usize>> {
-    let is_it = maker == Maker::Gyroflow && kind == Kind::Gyro;
-    let axis = |axis: &str| place(names, axis).ok();
-    is_it.then(|| ["rx", "ry", "rz"].into_iter().map(axis).collect())?
 }
 
 /// Role of a table: its columns, its kind, and what a column of it is by its part.
@@ -380,200 +282,10 @@ impl Roles<'_> {
         self.given.and_then(|given| given.of(role))
     }
 
-    /// The columns of a kind, where there are any.
-    pub(super) fn chosen(
-        &self,
-        kind: Kind,
-        notes: &mut Vec<String>,
-    ) -> Result<Option<RoleColumns>, Diagnostic> {
-        if let Some(given) = self.given_of(Role::Of(kind)) {
-            if given.columns.is_empty() {
-                return Ok(None);
-            }
-            let places = given.columns.iter().map(|column| place(self.names, column));
-            let places: Result<Vec<usize>, String> = places.collect();
-            let columns = places.map_err(|why| format!("{COLUMNS} {}: {why}", kind.name()))?;
-            let unit = match given.unit {
-                Some(unit) => Some(unit),
-                None => self.unit(kind, &columns, notes)?.flatten(),
-            };
-            return Ok(Some(RoleColumns { columns, unit }));
-        }
-        let mut groups = candidates(self.names, kind);
-        if kind == Kind::Accel && self.is_physics_toolbox() {
-            // Beside the force stands what is left of it without gravity.
-            groups.retain(|group| {
-                let first = group.columns.first().and_then(|at| self.names.get(*at));
-                first.is_some_and(|name| name.text.to_lowercase().starts_with("gf"))
-            });
-        }
-        if groups.is_empty() && (kind == Kind::Gyro || self.wanted != Wanted::Rates) {
-            groups.extend(bare_axes(self.names, self.stem, kind).map(|columns| Group {
-                columns,
-                twice: None,
-            }));
-        }
-        if groups.is_empty() {
-            let columns = axes_of_maker(self.names, self.preamble.maker, kind);
-            groups.extend(columns.map(|columns| Group {
-                columns,
-                twice: None,
-            }));
-        }
-        if groups.len() > 1 {
-            groups.retain(|group| group.columns.iter().all(|at| !self.is_empty(*at)));
-        }
-        self.keep_mended(kind, &mut groups);
-        let [group] = groups.as_slice() else {
-            if groups.is_empty() {
-                self.say_aside(kind, notes);
-                return Ok(None);
-            }
-            return Err(self.several(kind, &groups));
-        };
-        if let Some([first, second]) = group.twice {
-            return Err(Diagnostic::new(format!(
-                "{} is there twice, as columns {} and {}: which of them is meant cannot be told",
-                self.listed(&[first]),
-                first + 1,
-                second + 1
-            ))
-            .help(format!(
-                "{COLUMNS} {}={} takes the first, by its number; {}=none neither",
-                kind.name(),
-                self.references(&group.columns),
-                kind.name()
-            )));
-        }
-        let columns = group.columns.clone();
-        let Some(unit) = self.unit(kind, &columns, notes)? else {
-            return Ok(None);
-        };
-        Ok(Some(RoleColumns { columns, unit }))
-    }
-
-    /// The unit of these columns, by their names, or by what the maker's documents say; `None` where a role that can be
-    /// done without has an unknown one.
-    fn unit(
-        &self,
-        kind: Kind,
-        columns: &[usize],
-        notes: &mut Vec<String>,
-    ) -> Result<Option<Option<Unit>>, Diagnostic> {
-        let names: Vec<&Name> = columns
-            .iter()
-            .filter_map(|at| self.names.get(*at))
-            .collect();
-        let Some(first) = names.first() else {
-            return Ok(Some(None));
-        };
-        if let Some(other) = names.iter().find(|name| name.unit != first.unit) {
-            return Err(Diagnostic::new(format!(
-                "its {} has several units: `{}` and `{}`",
-                kind.name(),
-                first.text,
-                other.text
-            ))
-            .help(format!(
-                "{COLUMNS} {}={}:UNIT, where all of them are of one",
-                kind.name(),
-                self.references(columns)
-            )));
-        }
-        Ok(match (&first.unit, kind) {
-            (Some(Ok(unit)), _) => Some(Some(self.upward(kind, columns, *unit))),
-            (Some(Err(unit)), Kind::Gyro) => {
-                return Err(Diagnostic::new(format!(
-                    "the unit `{unit}` of its rates is not known"
-                ))
-                .help(format!(
-                    "{COLUMNS} gyro={}:deg/s (or rad/s, mrad/s, mdps)",
-                    self.references(columns)
-                )));
-            }
-            (Some(Err(unit)), Kind::Accel) => {
-                notes.push(format!(
-                    "{} are not used: their unit `{unit}` is not known ({COLUMNS} accel={}:g)",
-                    self.listed(columns),
-                    self.references(columns)
-                ));
-                None
-            }
-            _ => Some(self.unit_of_maker(kind, first)),
-        })
-    }
-
-    /// Unit that the maker's documents give to a column that states none.
-    fn unit_of_maker(&self, kind: Kind, name: &Name) -> Option<Unit> {
-        let head = self.preamble;
-        let si = Unit::Force(AccelUnit::MetresPerSecondSquared, 1.0);
-        let gravities = |scale: f64| Unit::Force(AccelUnit::StandardGravity, scale);
-        let rad = Unit::Rate(GyroUnit::Rad, 1.0);
-        let is_named = |stem: &str| name.text.to_lowercase().starts_with(stem);
-        match (head.maker, kind) {
-            (Maker::Gyroflow, Kind::Gyro) => {
-                head.gscale.map(|scale| Unit::Rate(GyroUnit::Rad, scale))
-            }
-            (Maker::Gyroflow, Kind::Accel) => head.ascale.map(gravities),
-            (Maker::Gyroflow, Kind::Mag) => head.mscale.map(|scale| Unit::Field(scale * 1e-4)),
-            (Maker::Xsens, Kind::Gyro) if is_named("gyr_") => Some(rad),
-            (Maker::Dot, Kind::Gyro) if is_named("gyr_") => Some(Unit::Rate(GyroUnit::Deg, 1.0)),
-            (Maker::Xsens | Maker::Dot, Kind::Accel) if is_named("acc_") => Some(si),
-            (_, Kind::Gyro) if self.is_physics_toolbox() || name.text.len() == 1 => Some(rad),
-            (_, Kind::Accel) if self.is_physics_toolbox() => Some(gravities(1.0)),
-            (_, Kind::Mag) if self.is_physics_toolbox() => Some(Unit::Field(1e-6)),
-            _ => None,
-        }
-    }
-
-    /// Physics Toolbox has the force in g beside what is left of it without gravity.
-    fn is_physics_toolbox(&self) -> bool {
-        self.names
-            .iter()
-            .any(|name| name.text.eq_ignore_ascii_case("gfx"))
-    }
-
     /// Whether a column has nothing in the first rows.
     pub(super) fn is_empty(&self, at: usize) -> bool {
         let cell = |row: &Vec<String>| row.get(at).is_none_or(String::is_empty);
         !self.rows.is_empty() && self.rows.iter().all(cell)
-    }
-
-    fn say_aside(&self, kind: Kind, notes: &mut Vec<String>) {
-        let each = self.names.iter().enumerate();
-        let aside: Vec<(usize, &str)> = each
-            .filter_map(|(at, name)| match name.meant {
-                Meant::Aside { kind: of, why } if of == kind => Some((at, why)),
-                _ => None,
-            })
-            .collect();
-        if let Some((_, why)) = aside.first() {
-            let columns: Vec<usize> = aside.iter().map(|(at, _)| *at).take(3).collect();
-            notes.push(format!(
-                "{} is not used, since it {why}: {COLUMNS} {}={} uses it",
-                self.listed(&columns),
-                kind.name(),
-                self.references(&columns)
-            ));
-        }
-    }
-
-    fn several(&self, kind: Kind, groups: &[Group]) -> Diagnostic {
-        let each: Vec<String> = groups.iter().map(|g| self.listed(&g.columns)).collect();
-        let flags: Vec<String> = groups
-            .iter()
-            .map(|g| format!("{COLUMNS} {}={}", kind.name(), self.references(&g.columns)))
-            .collect();
-        let none = match kind {
-            Kind::Gyro => String::new(),
-            _ => format!(", or {COLUMNS} {}=none", kind.name()),
-        };
-        Diagnostic::new(format!(
-            "its {} may be {}: which is meant cannot be told",
-            kind.name(),
-            each.join(" or ")
-        ))
-        .help(format!("{}{none}", flags.join(", or ")))
     }
 
     /// Columns by name, for people.
@@ -596,7 +308,7 @@ impl Roles<'_> {
         }
     }
 
-    fn references(&self, columns: &[usize]) -> String {
+    pub(super) fn references(&self, columns: &[usize]) -> String {
         let all: Vec<String> = columns.iter().map(|at| self.reference(*at)).collect();
         all.join(":")
     }

@@ -3,7 +3,8 @@
 //! Apart from the roles because this maker writes each sensor twice, as it is and as iOS mends it, each with its own
 //! stamp in the same row: what belongs together is told by the beginning of the names.
 
-use super::roles::{Group, Roles};
+use super::candidates::Group;
+use super::roles::Roles;
 use crate::columns::Kind;
 use crate::columns::Unit;
 

@@ -4,7 +4,8 @@
 //! row in another, and which it is shows in the first rows. Two bodies in one table are never mixed.
 
 use super::super::column::Column;
-use super::roles::{RoleColumns, Roles, place};
+use super::candidates::place;
+use super::roles::{RoleColumns, Roles};
 use crate::columns::{Meant, Role};
 use std::collections::BTreeSet;
 use strapd_attitude::diagnostic::Diagnostic;

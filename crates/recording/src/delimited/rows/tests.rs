@@ -1,6 +1,7 @@
 //! Rows of strapd's own table; those of others are in `tests/recording/delimited.rs`.
 
 use super::*;
+use strapd_attitude::record::{Nanos, SampleKind};
 
 const OURS: &[u8] = b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\r\n";
 
