@@ -38,6 +38,9 @@
 //! interval only, so `start` is later than the stamp before, and the propagator fills the hole.
 //! An increment that states its own interval keeps it for its angle; where stamps and
 //! intervals disagree by less than half an interval, the stamps are taken to jitter.
+//!
+//! Long because the policy of the whole room stands in its head, and because it is one machine: an entry that leaves the
+//! line goes through spikes, timing and counts in one loop, which every stage can stop.
 
 mod broken;
 mod clock;

@@ -1,18 +1,20 @@
 //! Propagator and filter together: corrected rates in, corrected attitudes out. Pure.
 
+mod headings;
+mod innovations;
+
 use super::beside::VectorPairing;
 use super::calibration::CorrectionMatrices;
 use super::filter::{Filter, Innovation, Measured};
-use super::heading::wrapped;
 use super::other_class::OtherClass;
-use super::outside_heading::{Now, OutsideHeading, OutsideHeadingCounts, OutsideHeadings, Use};
+use super::outside_heading::OutsideHeadings;
 use super::settings::Settings;
 use super::world::World;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use std::collections::VecDeque;
 
 /// Least sigma of the tilt of an attitude that was saved, rad.
@@ -194,38 +196,7 @@ impl AidedPropagator {
         self.gives_acceleration
     }
 
-    /// Keeps the innovations of every correction from now on, for [`AidedPropagator::innovations`].
-    pub fn keep_innovations(&mut self) {
-        self.innovations.get_or_insert_default();
-    }
-
-    /// Whether they are kept.
-    pub(crate) fn keeps_innovations(&self) -> bool {
-        self.innovations.is_some()
-    }
-
-    /// Takes the innovations kept since the last call, each with the stamp of the correction.
-    pub fn innovations(&mut self) -> Vec<(Nanos, Innovation)> {
-        self.innovations
-            .as_mut()
-            .map(std::mem::take)
-            .unwrap_or_default()
-    }
-
-    /// The same propagator, which keeps no innovations: those of one that is gone back to are kept already.
-    pub(crate) fn checkpoint(&mut self) -> AidedPropagator {
-        let kept = self.innovations.take();
-        let same = self.clone();
-        self.innovations = kept;
-        same
-    }
-
-    /// Keeps the innovations of the one that this is instead of.
-    pub(crate) fn keep_innovations_of(&mut self, before: &mut AidedPropagator) {
-        self.innovations = before.innovations.take();
-    }
-
-    /// Whether they do.
+    /// Whether specific forces come by [`AidedPropagator::take_force`].
     pub(crate) fn has_forces_beside(&self) -> bool {
         self.stream.forces.is_some()
     }
@@ -246,20 +217,6 @@ impl AidedPropagator {
     /// The same for a magnetic field, any linear unit.
     pub fn take_field(&mut self, stamp: Nanos, field: In<Body>) {
         self.stream.fields.take(stamp, *field.as_vector());
-    }
-
-    /// Takes a heading that something else has measured at `stamp`; without one, at the next sample. It is compared
-    /// there, up to three seconds later. Where no magnetic field tells the heading, the first one, and later ones that
-    /// contradict it for ten seconds, turn the world, which says [`Status::RESET`]; all others correct the heading, and
-    /// by it the bias. Those beyond four sigmas are counted and not used.
-    pub fn take_heading(&mut self, stamp: Option<Nanos>, measured: OutsideHeading) {
-        self.stream.headings.take(stamp, measured);
-    }
-
-    /// Counts of such headings.
-    #[must_use]
-    pub fn outside_headings(&self) -> OutsideHeadingCounts {
-        self.stream.headings.counts
     }
 
     /// The filter, for what it has learned.
@@ -303,13 +260,6 @@ impl AidedPropagator {
         self.propagator.begin_anew(attitude);
         self.anew = Some(start);
         self.heading = None;
-    }
-
-    /// Turns the world about the vertical, so that the next sample has this heading (rad, in (-pi, pi]), and says
-    /// [`Status::RESET`]; tilt and what was learned of the sensor stay as they are. Where a magnetic field tells the
-    /// heading, that is found anew by the field, whatever `heading` is.
-    pub fn turn_heading(&mut self, heading: f64) {
-        self.heading = Some(heading);
     }
 
     /// Takes samples in and appends the attitudes that are ready.
@@ -464,60 +414,6 @@ impl AidedPropagator {
         }
         scratch.clear();
         self.scratch = scratch;
-    }
-
-    /// The attitude at `stamp` is asked to have this heading.
-    fn set_heading(&mut self, stamp: Nanos, attitude: &Quaternion<Nav, Body>, heading: f64) {
-        let has_field = self.filter.has_field();
-        let heading = match has_field {
-            true => attitude.yaw_pitch_roll().yaw,
-            false => heading,
-        };
-        self.stream.world.set_heading(stamp, attitude, heading);
-        self.stream.headings.begin_anew();
-        self.filter.restart_heading();
-    }
-
-    /// Compares the headings from outside up to this sample, whose corrected attitude and matrix are these. Whether the
-    /// world has turned.
-    fn use_outside_headings(
-        &mut self,
-        sample: &AttitudeSample,
-        attitude: &Quaternion<Nav, Body>,
-        r: &Matrix3<f64>,
-    ) -> bool {
-        if !self.filter.is_started() {
-            return false;
-        }
-        let yaw = attitude.yaw_pitch_roll().yaw;
-        let level = r[(0, 0)].powi(2) + r[(1, 0)].powi(2);
-        // Of the body's x axis, seen from above.
-        let nose = r * sample.rate.0.cross(&Vector3::x());
-        let now = Now {
-            stamp: sample.stamp,
-            heading: self.stream.world.heading(yaw),
-            rate: (r[(0, 0)] * nose.y - r[(1, 0)] * nose.x) / level.max(1e-9),
-            steepness: r[(2, 0)],
-            variance: self.filter.heading_variance(),
-            is_free: !self.filter.has_field(),
-        };
-        let mut asked = Vec::new();
-        self.stream.headings.at(&now, &mut asked);
-        let mut has_turned = false;
-        for wanted in asked {
-            match wanted {
-                Use::Correct(off, variance) => self.filter.add_outside_heading(off, variance),
-                Use::Turn(off, variance) => {
-                    let heading = wrapped(now.heading + off);
-                    self.stream
-                        .world
-                        .set_heading(sample.stamp, attitude, heading);
-                    self.filter.know_heading(variance);
-                    has_turned = true;
-                }
-            }
-        }
-        has_turned
     }
 
     /// Takes what was measured at an attitude, which with the correction so far has the matrix `r`. Whether that is

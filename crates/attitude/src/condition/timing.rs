@@ -3,8 +3,11 @@
 //! A stage of its own because this is where stamps become time: from here on a sample covers an
 //! interval, says whether something before it is missing, and never shares its instant.
 
+mod gaps;
+mod placement;
+
 use super::gate::{Entry, finite_accel};
-use super::report::{Gap, Report};
+use super::report::Report;
 use super::settings::{OnGap, Settings};
 use super::spacing::{Spacing, Steps};
 use crate::frames::In;
@@ -13,10 +16,6 @@ use nalgebra::Vector3;
 
 /// Interval of a lone increment that says nothing of its own: only its mean rate depends on it.
 const LONE_INTERVAL_NANOS: i64 = 10_000_000;
-/// Number of steps a late stamp may take to catch up.
-/// Beyond a dozen steps a few percent of error in the ordinary step look like a sample.
-const MAX_LOOK: usize = 12;
-
 /// Samples on one stamp, on average, from which the clock is coarse: it counts in steps longer than the
 /// sensor's, and a stamp says only in which of them a sample was taken. Pairs are collisions.
 const COARSE: usize = 3;
@@ -313,203 +312,7 @@ impl Timing {
             self.spacing.nominal().unwrap_or(LONE_INTERVAL_NANOS)
         }
     }
-
-    /// A step above the ordinary: missing samples, or a late stamp that its successors catch up with.
-    #[cold]
-    fn judge_step(&self, entry: &Entry, step: i64, ahead: &[Entry], report: &mut Report) -> Join {
-        let Some(previous) = self.previous else {
-            return Join::Start;
-        };
-        // An increment covers its own interval: only what is before that is missing.
-        let length = match self.kind {
-            SampleKind::Rate => step,
-            _ => step.saturating_sub(self.own_interval(entry)).max(0),
-        };
-        if length <= self.max_gap_nanos && self.is_caught_up(entry, previous.stamp, ahead) {
-            return Join::Continuous;
-        }
-        let join = match self.on_gap {
-            _ if length <= self.max_gap_nanos => Join::Bridge,
-            OnGap::Bridge => Join::Bridge,
-            OnGap::Hold => Join::Hold,
-            OnGap::Reset => Join::Reset,
-        };
-        let missing = match self.spacing.nominal() {
-            _ if entry.interval > 0 => rounded_ratio(length, entry.interval),
-            Some(nominal) => rounded_ratio(step, nominal).saturating_sub(1),
-            None => 0,
-        };
-        let rate = self.rate_of(&previous).max(self.entry_rate(entry));
-        report.gaps.add(Gap {
-            start: previous.stamp,
-            length_nanos: length,
-            join,
-            missing,
-            rotation_bound: rate * (length as f64 * 1e-9),
-        });
-        join
-    }
-
-    /// Whether the entries ahead arrive early by as much as this one is late: then nothing is
-    /// missing, the stamp was delayed. The first of them (or a later one) must be where it would be had
-    /// every sample since `before` taken its own interval.
-    fn is_caught_up(&self, entry: &Entry, before: Nanos, ahead: &[Entry]) -> bool {
-        if self.spacing.nominal().is_none() && entry.interval == 0 {
-            return false;
-        }
-        let mut covered = self.own_interval(entry);
-        let mut stamp = entry.stamp;
-        for next in ahead.iter().take(MAX_LOOK) {
-            if next.epoch != entry.epoch {
-                return false;
-            }
-            let interval = self.own_interval(next);
-            covered = covered.saturating_add(interval);
-            // A sample that shares its stamp has none of its own: it proves nothing.
-            let shares = next.stamp == stamp;
-            stamp = next.stamp;
-            if !shares && stamp.since(before) <= covered.saturating_add(interval / 4) {
-                return true;
-            }
-        }
-        false
-    }
-
-    #[cold]
-    fn jump_back(&self, stamp: Nanos, report: &mut Report) -> Join {
-        let Some(previous) = self.previous else {
-            return Join::Start;
-        };
-        let join = match self.on_gap {
-            OnGap::Hold | OnGap::Bridge => Join::Hold,
-            OnGap::Reset => Join::Reset,
-        };
-        report.gaps.add(Gap {
-            start: previous.stamp,
-            // A new epoch may begin later than the old one ended only through strays.
-            length_nanos: stamp.since(previous.stamp).min(-1),
-            join,
-            missing: 0,
-            rotation_bound: 0.0,
-        });
-        join
-    }
-
-    fn rate_of(&self, sample: &Previous) -> f64 {
-        let secs = sample.stamp.secs_since(sample.start);
-        match self.kind {
-            SampleKind::Rate => sample.value.norm(),
-            _ if secs > 0.0 => sample.value.norm() / secs,
-            _ => 0.0,
-        }
-    }
-
-    fn entry_rate(&self, entry: &Entry) -> f64 {
-        match self.kind {
-            SampleKind::Rate | SampleKind::Average => (entry.value - self.bias).norm(),
-            SampleKind::DeltaAngle | SampleKind::Rotation => {
-                let secs = self.own_interval(entry) as f64 * 1e-9;
-                entry.value.norm() / secs
-            }
-        }
-    }
-
-    /// Stamps for entries that all carry the stamp of the first.
-    ///
-    /// Two real samples that collided on one stamp leave a longer step beside them: the later ones
-    /// go into the step after, evenly, or else the earlier ones into the step before. Where
-    /// there is no room, what is too many is dropped: the instant is known already. What a sample means
-    /// plays no part in it.
-    ///
-    /// A coarse clock's samples lie in the step that begins with their stamp: the first ones of a stream
-    /// at its end, for a recording begins anywhere in it, and the last ones no further than it reaches.
-    pub(super) fn place(&self, sharing: &[Entry], next: Option<Nanos>) -> Placement {
-        let Some(first) = sharing.first() else {
-            return Placement::alone(Nanos::default());
-        };
-        let at = first.stamp;
-        let same_epoch = self.previous.filter(|p| p.epoch == first.epoch);
-        // Live, the first of them has left the moment it came.
-        let left = i64::from(same_epoch.is_some_and(|p| p.stamp >= at));
-        let before = same_epoch.filter(|_| left == 0).map(|p| p.stamp);
-        let n = sharing.len() as i64 + left;
-
-        let room_before = before.map_or(0, |before| at.since(before));
-        let room_after = next.map(|next| next.since(at)).or(self.coarse);
-        let nominal = self.spacing.nominal().unwrap_or(match room_after {
-            Some(room) => (room / n).max(1),
-            None => LONE_INTERVAL_NANOS,
-        });
-        // Nothing lies further behind the end of a stream than one more step.
-        let room_after = room_after.unwrap_or(nominal.saturating_mul(2));
-        if let Some(quantum) = self.coarse
-            && left == 0
-            && next.is_some()
-            && (before.is_none() || room_before > quantum.saturating_add(quantum / 2))
-        {
-            let room = room_after.min(quantum);
-            let step = nominal.min(room / n).max(1);
-            return Placement {
-                from: Nanos(at.0.saturating_add((room - step.saturating_mul(n)).max(0))),
-                step,
-                keep: sharing.len(),
-                original: at,
-            };
-        }
-        if let (Some(step), Some(quantum), Some(before)) = (self.step, self.coarse, before) {
-            return on_line(sharing.len(), (before, at), step, quantum);
-        }
-        let least = (nominal - nominal / 4).max(1);
-        let most = nominal.saturating_add(nominal / 4);
-        let spread = |room: i64, n: i64| match room / n {
-            // More than enough: samples are missing as well, or the recording ends within the step; keep to
-            // the ordinary one.
-            step if step > most || (next.is_none() && step > nominal) => nominal,
-            step => step,
-        };
-        let (keep, step, backwards) = if room_after / n >= least {
-            (n, spread(room_after, n), false)
-        } else if self.coarse.is_some() {
-            // A rate that has risen: no clock but this one says how many there are. None was taken before its stamp.
-            (n, room_after / n, false)
-        } else if room_before / n >= least {
-            (n, spread(room_before, n), true)
-        } else {
-            let keep = (room_after / least).clamp(1, n);
-            (keep, spread(room_after, keep), false)
-        };
-        // Below one nanosecond apart there are no two instants.
-        let keep = if step > 0 { keep } else { 1 };
-        let from = if backwards {
-            at.0.saturating_sub(step.saturating_mul(keep - 1))
-        } else {
-            at.0.saturating_add(step.saturating_mul(left))
-        };
-        Placement {
-            from: Nanos(from),
-            step,
-            keep: (keep - left).max(0) as usize,
-            original: at,
-        }
-    }
 }
-
-/// Places of `n` samples in the step of a coarse clock that begins `at`: the sensor's own steps go on from the sample
-/// `before`. The first of a step of the clock lies within a step of the sensor of its beginning, and none beyond its end.
-fn on_line(n: usize, (before, at): (Nanos, Nanos), step: i64, quantum: i64) -> Placement {
-    let latest = at.0.saturating_add(step.saturating_sub(1).max(0));
-    let from = before.0.saturating_add(step).clamp(at.0, latest);
-    let last = at.0.saturating_add(quantum.saturating_sub(1));
-    let between = i64::try_from(n).unwrap_or(i64::MAX).saturating_sub(1);
-    let most = last.saturating_sub(from) / between.max(1);
-    Placement {
-        from: Nanos(from),
-        step: step.min(most).max(1),
-        keep: n,
-        original: at,
-    }
-}
-
 /// Entries in a row that share one stamp.
 struct Group {
     n: i64,
@@ -542,37 +345,6 @@ fn is_coarse(entries: usize, stamps: usize) -> bool {
     entries > COARSE * stamps.saturating_sub(1).max(1)
 }
 
-/// Places of samples that shared a stamp: `from`, `from + step`, ...; the first `keep` of them.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Placement {
-    from: Nanos,
-    step: i64,
-    keep: usize,
-    original: Nanos,
-}
-
-impl Placement {
-    fn alone(at: Nanos) -> Self {
-        Placement {
-            from: at,
-            step: 0,
-            keep: 1,
-            original: at,
-        }
-    }
-
-    /// The stamp of the `i`-th, `None` when there is no room for it.
-    pub(super) fn stamp(&self, i: usize) -> Option<Nanos> {
-        let after = self.step.saturating_mul(i64::try_from(i).ok()?);
-        (i < self.keep).then_some(Nanos(self.from.0.saturating_add(after)))
-    }
-
-    /// Whether this stamp is other than the recorded one.
-    pub(super) fn moves(&self, stamp: Nanos) -> bool {
-        stamp != self.original
-    }
-}
-
 /// The verdict of an entry that is used.
 pub(super) fn verdict(status: Status) -> Verdict {
     if status.has(Status::RESTAMPED) {
@@ -582,11 +354,4 @@ pub(super) fn verdict(status: Status) -> Verdict {
     } else {
         Verdict::Accepted
     }
-}
-
-/// `a / b` to the nearest whole number.
-fn rounded_ratio(a: i64, b: i64) -> u64 {
-    let b = b.max(1);
-    let half_up = a.saturating_add(b / 2) / b;
-    u64::try_from(half_up).unwrap_or(0)
 }

@@ -3,7 +3,9 @@
 //! Conditions and propagates; what must be known first ([`Prepared`]) is given. Reads no clock and
 //! does no I/O.
 
+mod build;
 mod headings;
+mod told;
 
 use super::aiding::{self, Forces};
 use super::anew::RestartRequest;
@@ -13,25 +15,17 @@ use super::kept::{Spool, SpoolError};
 use super::magnetometer_watch::MagnetometerWatch;
 use super::meaning::Meaning;
 use super::memory::Memory;
-use super::noise_presets::UNCALIBRATED;
 use super::open_kind::{Event, OpenKind};
 use super::output_frame::OutputFrame;
-use super::plan::{EstimationSettings, Initial, Noise};
-use super::preparation::{Prepared, is_causal};
+use super::preparation::Prepared;
 use super::retaking::{Besides, Retaking, Stages};
 use super::sample_kind::{KindChoice, KindReason};
-use super::settings_fingerprint::settings_fingerprint;
-use super::smoothing::{Recording, Smoothing, SmoothingInputs};
-use super::smoothing_priors::looseness;
 use super::temperatures::Temperatures;
-use crate::aid::{self, AidedPropagator, OtherClass};
-use crate::condition::regularise::{self, Regulariser};
+use crate::condition::regularise::Regulariser;
 use crate::condition::{self, Clock, Conditioner};
-use crate::consistency::{Consistency, FieldConsistency};
 use crate::diagnostic::Diagnostic;
-use crate::propagate::{self, Executor, Method, Propagator};
+use crate::propagate::Executor;
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
-use crate::smooth::PriorSigmas;
 
 /// Samples at once that memory is kept for.
 const FEW: usize = 8;
@@ -85,179 +79,10 @@ struct AuxiliaryInputs {
 }
 
 impl Estimator {
-    /// Makes one for samples understood as `resolved`, from what `prepared` states.
-    ///
-    /// The method without latency takes them as [`Estimator::live`] does, in a replay, too: what it gives
-    /// is what a daemon would have said.
-    ///
-    /// # Errors
-    /// In words, with the flag that helps: settings that cannot be.
-    pub fn new(
-        plan: &EstimationSettings,
-        resolved: &Meaning,
-        prepared: &Prepared,
-    ) -> Result<Estimator, Diagnostic> {
-        if matches!(
-            plan.method,
-            Method::Live { .. } | Method::CommitProvisional { .. }
-        ) {
-            return Estimator::live(plan, resolved, prepared);
-        }
-        let resolved = &match resolved.is_kind_open() {
-            true => resolved.with_kind(&prepared.sample_kind),
-            false => resolved.clone(),
-        };
-        let settings = conditioning(plan, resolved, prepared);
-        Estimator::with(plan, resolved, prepared, &settings)
-    }
-
-    /// The same for a live stream: no sample waits for its successors, so one that comes late is
-    /// dropped and counted.
-    ///
-    /// # Errors
-    /// As [`Estimator::new`].
-    pub fn live(
-        plan: &EstimationSettings,
-        resolved: &Meaning,
-        prepared: &Prepared,
-    ) -> Result<Estimator, Diagnostic> {
-        let is_open = is_causal(plan)
-            && matches!(
-                resolved.kind_reason,
-                KindReason::Unknown | KindReason::Step(_)
-            );
-        if !is_open {
-            return Estimator::live_of_kind(plan, resolved, prepared);
-        }
-        // Undecided until there is a step, whoever has looked ahead.
-        let resolved = resolved.with_kind(&KindChoice::OPEN);
-        let prepared = Prepared {
-            sample_kind: KindChoice::OPEN,
-            ..prepared.clone()
-        };
-        let mut estimator = Estimator::live_of_kind(plan, &resolved, &prepared)?;
-        estimator.open = Some(Box::new(OpenKind::new(plan, &resolved, &prepared)));
-        Ok(estimator)
-    }
-
-    pub(super) fn live_of_kind(
-        plan: &EstimationSettings,
-        resolved: &Meaning,
-        prepared: &Prepared,
-    ) -> Result<Estimator, Diagnostic> {
-        let settings = condition::Settings {
-            reorder_window: condition::Settings::LIVE_WINDOW,
-            ..conditioning(plan, resolved, prepared)
-        };
-        Estimator::with(plan, resolved, prepared, &settings)
-    }
-
-    fn with(
-        plan: &EstimationSettings,
-        resolved: &Meaning,
-        prepared: &Prepared,
-        settings: &condition::Settings,
-    ) -> Result<Estimator, Diagnostic> {
-        // What corrects the attitude has a noise of its own.
-        let noise = match (prepared.aiding.is_some(), plan.initial) {
-            (true, _) => Noise {
-                scale: 0.0,
-                misalignment: 0.0,
-                ..prepared.noise.clone()
-            },
-            (false, Initial::Gravity) => prepared.noise.levelled(prepared.tilt_sigma),
-            (false, _) => prepared.noise.clone(),
-        };
-        let noise = match (&plan.calibration, &prepared.aiding) {
-            (Some(known), None) => known.narrowed(&noise),
-            _ => noise,
-        };
-        let propagation = propagate::Settings {
-            method: plan.method,
-            kind: resolved.kind,
-            initial: prepared.initial,
-            world_rate: prepared.world_rate,
-            noise: noise.with_bias(prepared.bias_sigma.into()),
-        };
-        let noise = propagation.noise;
-        let integrator = match &prepared.aiding {
-            None => Propagator::new(propagation).map(|p| Integrator::Alone(Box::new(p))),
-            Some(aiding) => {
-                AidedPropagator::new(propagation, aiding.settings, aiding.start).map(|aided| {
-                    let aided = match aiding.forces {
-                        Forces::Beside => aided.with_forces_beside(),
-                        Forces::WithRates | Forces::Unseen => aided,
-                    };
-                    let wide = prepared.is_class_open.then(|| {
-                        let wide = aiding.uncalibrated(plan, resolved).settings;
-                        let noise = Noise::preset(UNCALIBRATED);
-                        (looseness(&wide, &noise), wide)
-                    });
-                    let aided = aided
-                        .or_of(wide.map(|(_, wide)| OtherClass::of(&wide)))
-                        .with_linear_acceleration(plan.linear_acceleration);
-                    if plan.smooth {
-                        let heading = match aiding.start {
-                            aid::Start::Level | aid::Start::LevelBy(_) => None,
-                            aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
-                        };
-                        let told = SmoothingInputs {
-                            kind: resolved.kind,
-                            heading,
-                            looseness: looseness(&aiding.settings, &prepared.noise),
-                            other: wide.map(|(looseness, _)| looseness),
-                            is_class_found: plan.noise.is_by_data()
-                                && prepared.noise != plan.noise.taken(),
-                            bias_sigma: prepared.noise.bias_of_class(),
-                            known: PriorSigmas {
-                                gyro_bias: aiding.stated_bias(prepared.bias_left.is_some()),
-                                ..resolved.beforehand()
-                            },
-                        };
-                        let smoothing = Smoothing::new(aided, told);
-                        Integrator::Smoothed(Box::new(smoothing))
-                    } else {
-                        Integrator::Aided(Box::new(aided))
-                    }
-                })
-            }
-        }
-        .map_err(|e| Diagnostic::from(&e))?;
-        Ok(Estimator {
-            settings: settings_fingerprint(settings, plan, prepared, &noise),
-            conditioner: {
-                let mut conditioner = Conditioner::new(settings).map_err(|e| e.to_string())?;
-                conditioner.keep_revisions();
-                conditioner
-            },
-            retaking: Retaking::default(),
-            regulariser: prepared.stamps.regulariser(resolved.kind)?,
-            integrator,
-            asked: OutputFrame::of(plan, prepared),
-            beside: Vec::new(),
-            besides: prepared.aiding.map(|aiding| AuxiliaryInputs {
-                resolved: resolved.clone(),
-                clock: prepared.clock,
-                forces: aiding.forces,
-                has_field: aiding.settings.has_field,
-                force_scale: None,
-            }),
-            watch: None,
-            magnetometer: None,
-            begins_anew: false,
-            rates: Vec::new(),
-            even: Vec::new(),
-            out: Vec::new(),
-            sample_kind: resolved.kind_choice(),
-            open: None,
-            before: Vec::new(),
-            left_until: None,
-            temperatures: Temperatures::default(),
-        })
-    }
-
     /// Goes on from the last attitude of an estimator whose settings were the same, before the first
     /// sample of this one: see [`Propagator::resume`].
+    ///
+    /// [`Propagator::resume`]: crate::propagate::Propagator::resume
     ///
     /// # Errors
     /// In words: it is no rotation.
@@ -390,6 +215,8 @@ impl Estimator {
     /// Takes the specific force, or the magnetic field, of a message that carries no rate: of topics, and at
     /// rates, of their own. What is not asked for ([`EstimationSettings::aid`]), and a force where forces come with the rates
     /// ([`Forces`]), is passed over.
+    ///
+    /// [`EstimationSettings::aid`]: super::EstimationSettings::aid
     pub fn take_beside(&mut self, raw: &RawSample) {
         self.temperatures.take(raw);
         self.take_field(raw);
@@ -565,134 +392,5 @@ impl Estimator {
             out: &mut self.out,
         };
         (&mut self.retaking, stages)
-    }
-
-    /// Holds the gyro against accelerometer and magnetometer from now on, for [`Estimator::consistency`] and
-    /// [`Estimator::field_consistency`]; `resolved` and `prepared` are those by which this was made.
-    pub fn watch_sensors(&mut self, resolved: &Meaning, prepared: &Prepared) {
-        let sensors = (Consistency::default(), FieldConsistency::default());
-        self.watch_by(resolved, prepared, sensors);
-    }
-
-    /// The same of a stream without an end, of which there may be many: less is kept of what is healthy.
-    pub fn watch_sensors_live(&mut self, resolved: &Meaning, prepared: &Prepared) {
-        let sensors = (Consistency::live(), FieldConsistency::live());
-        self.watch_by(resolved, prepared, sensors);
-    }
-
-    fn watch_by(
-        &mut self,
-        resolved: &Meaning,
-        prepared: &Prepared,
-        (gyro, field): (Consistency, FieldConsistency),
-    ) {
-        self.watch = Some(GyroWatch::new(&resolved.to_body(), gyro));
-        let watch = MagnetometerWatch::new(resolved, prepared.clock, field);
-        self.magnetometer = Some(Box::new(watch));
-    }
-
-    /// Number that tells settings apart under which samples, or what is remembered of them, mean something else.
-    #[must_use]
-    pub fn settings_fingerprint(&self) -> u64 {
-        self.settings
-    }
-
-    /// Gyro against accelerometer as far as was seen; `None` where nobody asked to watch.
-    #[must_use]
-    pub fn consistency(&self) -> Option<&Consistency> {
-        self.watch.as_ref().map(GyroWatch::consistency)
-    }
-
-    /// Gyro against magnetometer as far as was seen; `None` where nobody asked to watch.
-    #[must_use]
-    pub fn field_consistency(&self) -> Option<&FieldConsistency> {
-        Some(self.magnetometer.as_ref()?.consistency())
-    }
-
-    /// Kind for which samples are taken by now, and why.
-    #[must_use]
-    pub fn sample_kind(&self) -> KindChoice {
-        self.sample_kind
-    }
-
-    /// Temperature that was received last, degrees Celsius; `None` where samples carry none.
-    #[must_use]
-    pub fn temperature(&self) -> Option<f32> {
-        self.temperatures.last()
-    }
-
-    /// Report of conditioning.
-    #[must_use]
-    pub fn conditioning(&self) -> &condition::Report {
-        self.conditioner.report()
-    }
-
-    /// Report of the stamps, if they were regularised: whether causally, and how.
-    #[must_use]
-    pub fn regularising(&self) -> Option<(bool, regularise::Report)> {
-        let regulariser = self.regulariser.as_ref()?;
-        Some((regulariser.is_causal(), regulariser.report()))
-    }
-
-    /// Report of propagation.
-    #[must_use]
-    pub fn propagation(&self) -> propagate::Report {
-        self.integrator.propagation()
-    }
-
-    /// Filter that corrects the attitude, if there is one; beside a smoother, the one that runs along with it.
-    #[must_use]
-    pub fn filter(&self) -> Option<&aid::Filter> {
-        self.integrator.filter()
-    }
-
-    /// Result of a smoother, once it is finished; `None` where nobody asked for one.
-    ///
-    /// # Errors
-    /// In words: why it made nothing of it. The attitudes are the filter's then, to the bit.
-    #[must_use]
-    pub fn smoothed(&self) -> Option<Result<&Recording, &Diagnostic>> {
-        self.integrator.smoothed()
-    }
-
-    /// Keeps the innovations of what corrects the attitude, for [`Estimator::innovations`].
-    pub fn keep_innovations(&mut self) {
-        self.integrator.keep_innovations();
-    }
-
-    /// Takes the innovations kept since the last call, each with the stamp of the correction.
-    pub fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
-        self.integrator.innovations()
-    }
-
-    /// Whether attitudes carry the acceleration without gravity, of samples with a specific force: it was asked for, and
-    /// something tells the vertical.
-    #[must_use]
-    pub fn gives_acceleration(&self) -> bool {
-        self.integrator.gives_acceleration() || self.asked.gravity.is_some()
-    }
-
-    /// The method, with its window and order.
-    #[must_use]
-    pub fn method(&self) -> Method {
-        self.integrator.method()
-    }
-}
-
-fn conditioning(
-    plan: &EstimationSettings,
-    resolved: &Meaning,
-    prepared: &Prepared,
-) -> condition::Settings {
-    let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
-    let scale = prepared.aiding.map_or(1.0, |aiding| aiding.force_scale);
-    condition::Settings {
-        accel_scale: settings.accel_scale * scale,
-        truncation_step: prepared.truncation_step,
-        has_arrival: prepared.has_arrival,
-        batches: prepared.batches,
-        coarse: prepared.coarse,
-        gyro_range: prepared.gyro_range,
-        ..settings
     }
 }

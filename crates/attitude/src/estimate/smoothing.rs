@@ -3,6 +3,11 @@
 //! Apart from the smoother because that reads samples again and again, and here they come once: they are kept, with the
 //! vectors measured beside them ([`SampleStore`]), and a filter runs along for what the run says of turns, gaps and sensor.
 
+mod class;
+mod reading;
+
+use self::class::{LOOSER, LOOSER_KNOWN, is_beyond, is_held};
+use self::reading::Reading;
 use super::kept::{Event, SampleStore, Spool, SpoolError};
 use crate::aid::{AidedPropagator, VectorPairing};
 use crate::consistency::{FieldConsistency, FieldIron, FieldReading};
@@ -15,16 +20,13 @@ use crate::record::{
     Status,
 };
 use crate::smooth::{
-    Estimate, Estimated, FORCE_SCALE, FieldUnit, OtherClass, Outcome, PriorScale, PriorSigmas,
-    Sample, SampleModel, Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
+    Estimate, FieldUnit, OtherClass, Outcome, PriorScale, PriorSigmas, SampleModel, Settings,
+    Sizes, SmoothError, Smoothed, smooth,
 };
 use nalgebra::Vector3;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::num::NonZero;
-
-/// Time put between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
-const APART: i64 = 10_000_000_000;
 
 /// Samples that are handed on at once.
 const CHUNK: usize = 4096;
@@ -77,125 +79,6 @@ pub struct Recording {
     pub iron: Option<FieldIron>,
     /// Sizes of forces at rest and of fields, as measured (less that iron) and as calibrated.
     pub sizes: Vec<Sizes>,
-}
-
-/// A sensor is none of its class if a constant is found so many sigmas off: of what a log finds where the class is
-/// right, which is the less the less it sees (the prior's variance less what the log leaves of it).
-const BEYOND: f64 = 3.5;
-/// Least of that, beside the prior's sigma: what a log hardly sees is not looked at.
-const LEAST_SEEN: f64 = 0.1;
-/// And is smoothed again with priors that are so many times as wide: those of one that nobody has calibrated
-/// (`uncalibrated` beside what is expected where nobody says anything). Of acceleration it feels what its class does: with
-/// more the 14 recordings of BROAD are worse, and simulated bodies no better.
-const LOOSER: PriorScale = PriorScale {
-    scale: 2.5,
-    axes: 6.0,
-    force: 9.8,
-    sensitivity: 1.0,
-};
-/// Factor by which the sigmas of a calibration file are widened.
-const LOOSER_KNOWN: f64 = 2.5;
-
-fn is_beyond(smoothed: &Smoothed, looseness: PriorScale) -> bool {
-    let calibration = smoothed.calibration();
-    let force = own_scales(calibration.force, FORCE_SCALE * looseness.scale);
-    is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&force)
-}
-
-/// Whether something beside gravity holds the attitudes: a rest, a bias about an upright axis that was held, or a north.
-/// Without any, priors that are too narrow make motion of what is wrong with the sensor.
-fn is_held(smoothed: &Smoothed) -> bool {
-    smoothed.counts().standstills > 0
-        || smoothed.held().is_some()
-        || smoothed.sections().iter().any(|section| section.has_north)
-}
-
-/// Removes what the scales of all axes share, which is known of no accelerometer: each is then known to `own`.
-fn own_scales(mut force: Estimated<9>, own: f64) -> Estimated<9> {
-    const SCALES: [usize; 3] = [0, 4, 8];
-    if SCALES.iter().all(|i| force.prior[*i] > own) {
-        let common = SCALES.iter().map(|i| force.value[*i]).sum::<f64>() / 3.0;
-        for i in SCALES {
-            force.value[i] -= common;
-            (force.sigma[i], force.prior[i]) = (0.0, own);
-        }
-    }
-    force
-}
-
-fn is_off<const N: usize>(learned: &Estimated<N>) -> bool {
-    let sigmas = learned.sigma.iter().zip(&learned.prior);
-    let mut all = learned.value.iter().zip(sigmas);
-    all.any(|(value, (sigma, prior))| {
-        let seen = (prior * prior - sigma * sigma).max(0.0).sqrt();
-        value.abs() > BEYOND * seen.max(LEAST_SEEN * prior)
-    })
-}
-
-/// Kept samples, as the smoother reads them.
-struct Reading<'a> {
-    kept: &'a mut SampleStore,
-    iron: Option<FieldIron>,
-    has_forces_beside: bool,
-    /// Rates whose attitudes have not come yet, where they are wanted.
-    waiting: Option<&'a RefCell<VecDeque<RateSample>>>,
-}
-
-impl Samples for Reading<'_> {
-    type Error = SpoolError;
-
-    fn pass(&mut self, take: &mut dyn FnMut(&[Sample])) -> Result<(), SpoolError> {
-        let mut forces = self.has_forces_beside.then(VectorPairing::default);
-        let mut fields = VectorPairing::with_repeats();
-        let (mut last, mut shift): (Option<Nanos>, i64) = (None, 0);
-        let mut chunk = Vec::with_capacity(CHUNK);
-        let iron = self.iron;
-        self.kept.give(|event| match event {
-            Event::ForcesBeside => {
-                forces.get_or_insert_default();
-            }
-            Event::Force(stamp, force) => {
-                if let Some(forces) = &mut forces {
-                    forces.take(stamp, *force.as_vector());
-                }
-            }
-            Event::Field(stamp, field) => {
-                let measured = field.as_vector();
-                fields.take(stamp, iron.map_or(*measured, |iron| iron.undone(measured)));
-            }
-            Event::Rate(rate) => {
-                let turning = rate.mean_rate();
-                if let Some(last) = last.filter(|last| *last >= rate.stamp) {
-                    shift = shift.saturating_add(last.since(rate.stamp).saturating_add(APART));
-                }
-                last = Some(rate.stamp);
-                let force = match &mut forces {
-                    None => rate.accel,
-                    Some(forces) => forces.at(rate.stamp, &turning.0).map(In::assume),
-                };
-                chunk.push(Sample {
-                    stamp: Nanos(rate.stamp.0.saturating_add(shift)),
-                    rate: turning,
-                    force,
-                    field: fields.at(rate.stamp, &turning.0).map(In::assume),
-                    is_saturated: rate.status.has(Status::SATURATED),
-                });
-                if let Some(waiting) = self.waiting {
-                    let rate = RateSample {
-                        accel: force,
-                        ..rate
-                    };
-                    waiting.borrow_mut().push_back(rate);
-                }
-                if chunk.len() == CHUNK {
-                    take(&chunk);
-                    chunk.clear();
-                }
-            }
-        })?;
-        take(&chunk);
-        Ok(())
-    }
 }
 
 impl Smoothing {
@@ -480,158 +363,4 @@ fn turned(smoothed: &Smoothed, heading: Option<f64>, first: &Estimate) -> Quater
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
-mod tests {
-    use super::*;
-    use crate::aid::{self, Start};
-    use crate::propagate::{self, Sequential};
-    use crate::record::Measured;
-    use crate::smooth::BIAS_SIGMA;
-    use std::io::Cursor;
-
-    const SAMPLES: i64 = 24_000;
-
-    /// A hand that rests, turns and rests: rates, and forces and fields at rates and stamps of their own.
-    fn taken(smoothing: &mut Smoothing, is_smooth: bool) {
-        taken_by(smoothing, is_smooth, Vector3::zeros());
-    }
-
-    /// Accounts for an accelerometer that is off by `bias`.
-    fn taken_by(smoothing: &mut Smoothing, is_smooth: bool, bias: Vector3<f64>) {
-        let mut q = Quaternion::<Nav, Body>::identity();
-        for i in 0..SAMPLES {
-            let stamp = Nanos(i * 2_500_000);
-            let t = i as f64 * 0.0025;
-            let share = if (20.0..40.0).contains(&t) { 1.0 } else { 0.0 };
-            let rate = Vector3::new((1.1 * t).sin(), (0.7 * t).cos(), (1.7 * t).sin()) * share;
-            q = q.advanced(&RotationVector(rate * 0.0025));
-            let to_body = q.to_dcm().as_matrix().transpose();
-            // What never rests and goes far is not smoothed.
-            let push = if is_smooth {
-                0.0
-            } else {
-                9.0 * (0.2 * t).sin()
-            };
-            if i % 8 == 0 {
-                let force = to_body * Vector3::new(push, 0.0, 9.81);
-                smoothing.take_force(Nanos(stamp.0 - 1_000_000), In::assume(force + bias));
-            }
-            if i % 40 == 0 {
-                smoothing.take_field(
-                    Nanos(stamp.0 - 3_000_000),
-                    In::assume(to_body * Vector3::new(0.0, 20.0, -40.0)),
-                );
-            }
-            let wobble = Vector3::new(1.0, -2.0, 1.5) * (1e-3 * (31.0 * t).sin());
-            let shaken = if is_smooth { wobble } else { wobble * 200.0 };
-            let sample = RateSample {
-                stamp,
-                start: stamp,
-                gyro: Measured::Rate(BodyRate(rate + Vector3::repeat(0.01) + shaken)),
-                accel: None,
-                join: if i == 0 {
-                    Join::Start
-                } else {
-                    Join::Continuous
-                },
-                status: Status::OK,
-                log: Nanos(stamp.0 + 5),
-            };
-            smoothing.push(&[sample], &mut Vec::new());
-        }
-    }
-
-    fn aided() -> AidedPropagator {
-        let settings = aid::Settings {
-            has_field: true,
-            ..aid::Settings::default()
-        };
-        let aided = AidedPropagator::new(propagate::Settings::default(), settings, Start::Level);
-        aided.unwrap().with_forces_beside()
-    }
-
-    fn attitudes(mut smoothing: Smoothing) -> (Vec<AttitudeSample>, Option<String>) {
-        let mut all = Vec::new();
-        let given = smoothing.finish(&Sequential, &mut Vec::new(), &mut |some| {
-            all.extend_from_slice(some)
-        });
-        given.unwrap();
-        (
-            all,
-            smoothing
-                .result()
-                .and_then(Result::err)
-                .map(ToString::to_string),
-        )
-    }
-
-    fn new() -> Smoothing {
-        Smoothing::new(
-            aided(),
-            SmoothingInputs {
-                kind: SampleKind::Rate,
-                heading: None,
-                bias_sigma: BIAS_SIGMA,
-                looseness: PriorScale::default(),
-                other: None,
-                is_class_found: false,
-                known: PriorSigmas::default(),
-            },
-        )
-    }
-
-    #[test]
-    fn a_recording_kept_in_a_file_gives_the_bits_of_one_in_memory() {
-        for is_smooth in [true, false] {
-            let (mut held, mut spooled) = (new(), new());
-            spooled.kept = SampleStore::of_at_most(0);
-            spooled.spool_to(Box::new(Cursor::new(Vec::new())));
-            taken(&mut held, is_smooth);
-            taken(&mut spooled, is_smooth);
-            let (held, why) = attitudes(held);
-            assert_eq!(why.is_none(), is_smooth, "{why:?}");
-            assert_eq!(held.len() as i64, SAMPLES);
-            assert!(spooled.kept.spooled_bytes() > 0);
-            assert_eq!(attitudes(spooled), (held, why));
-        }
-    }
-
-    #[test]
-    fn an_accelerometer_far_off_its_class_is_smoothed_as_one_nobody_calibrated() {
-        for (off, is_beyond) in [(0.05, false), (0.4, true)] {
-            let bias = Vector3::new(off, -off, 0.5 * off);
-            let mut smoothing = new();
-            taken_by(&mut smoothing, true, bias);
-            let given = smoothing.finish(&Sequential, &mut Vec::new(), &mut |_| {});
-            given.unwrap();
-            let recording = smoothing.result().unwrap().unwrap();
-            assert_eq!(recording.is_beyond_class, is_beyond, "{off}");
-            let found = recording.smoothed.calibration().force_bias;
-            for axis in 0..3 {
-                let error = (found.value[axis] - bias[axis]).abs();
-                assert!(error < 3.0 * found.sigma[axis], "{off}: {found:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn where_nothing_is_smoothed_the_attitudes_are_the_filters_with_what_came_beside() {
-        let mut smoothing = new();
-        taken(&mut smoothing, false);
-        // The same events to a filter alone.
-        let (mut alone, mut filtered) = (aided(), Vec::new());
-        let events = smoothing.kept.give(|event| match event {
-            Event::Rate(rate) => alone.push(&[rate], &mut filtered),
-            Event::Force(stamp, force) => alone.take_force(stamp, force),
-            Event::Field(stamp, field) => alone.take_field(stamp, field),
-            Event::ForcesBeside => alone.expect_forces_beside(),
-        });
-        events.unwrap();
-        alone.finish(&mut filtered);
-        let running = format!("{:?}", smoothing.aided().filter().report());
-        let (given, why) = attitudes(smoothing);
-        assert!(why.is_some());
-        assert_eq!(given, filtered);
-        assert_eq!(running, format!("{:?}", alone.filter().report()));
-    }
-}
+mod tests;

@@ -1,4 +1,7 @@
 //! The stream: runs, breaks, outputs in order. Pure.
+//!
+//! Long because it is one machine: what is admitted, integrated, committed and forgotten moves the same queue, the same
+//! track and the same place in it.
 
 mod memory;
 mod state;

@@ -1,4 +1,6 @@
 //! The table itself, in the order in which rows are applied and help lists them.
+//!
+//! Long because it is one table: every setting is a row of it, and the order of all rows counts.
 
 use super::{Default, Row, Takes, Word};
 use crate::condition::{
