@@ -3,7 +3,7 @@
 use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
-use crate::pipeline::attitude_track::{self, Side};
+use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::opening;
 use crate::report::against;
 use crate::report::page::{STRETCHES, comparison_json};
@@ -73,17 +73,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let align: Align = args.align.parse().map_err(|e| {
         Error::usage(Diagnostic::from(&e).at(format_args!("--align {}", args.align)))
     })?;
-    if args
-        .max_angle
-        .is_some_and(|limit| limit.is_nan() || limit < 0.0)
-    {
-        return Err(Error::usage(
-            "--max-angle: an angle of 0 degrees or more".to_owned(),
-        ));
-    }
-    args.plot
-        .iter()
-        .try_for_each(|p| super::outputs::check_chart(p))?;
+    args.check()?;
     let inputs = [args.estimate.clone(), args.reference.clone()];
     let plot = args
         .plot
@@ -91,28 +81,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         .map(|p| Document::create(p, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
-    if args.estimate == args.reference && args.estimate.as_os_str() == "-" {
-        return Err(Error::usage(
-            Diagnostic::new("compare - -: standard input comes once")
-                .help("give one of the two a file"),
-        ));
-    }
-    let mut options = Options::default();
-    args.tables.put(&mut options)?;
-    let read = |path: &Path, side, topic: &Option<String>| {
-        attitude_track::read(
-            &opening::open(path)?,
-            side,
-            topic.as_deref(),
-            &options,
-            &pool,
-        )
-    };
-    let estimate = read(&args.estimate, Side::Estimate, &args.topic)?;
-    let reference = read(&args.reference, Side::Reference, &args.ref_topic)?;
-    for problem in estimate.problems.iter().chain(&reference.problems) {
-        tracing::warn!("{problem}");
-    }
+    let (estimate, reference) = args.read(&pool)?;
     let (estimated, referred) = (attitudes(&estimate), attitudes(&reference));
     // Whichever of the two was set anew: another world begins.
     let cuts: Vec<Nanos> = estimate
@@ -136,27 +105,67 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
             strapd_recording::Error::unsupported(Path::new(&estimate.name), e.to_string())
         })?)?;
     }
-    let exceeded = args
-        .max_angle
-        .is_some_and(|limit| errors.total.max.to_degrees() > limit);
+    let largest = errors.total.max.to_degrees();
+    let exceeded = args.max_angle.filter(|limit| largest > *limit);
     if global.json {
-        print(&format!(
-            "{}\n",
-            as_json((&result, &told), align, args.max_angle, exceeded)
-        ))?;
+        let value = as_json((&result, &told), align, args.max_angle, exceeded.is_some());
+        print(&format!("{value}\n"))?;
     } else if !global.quiet {
         let text = as_text(&result, align, &estimate.name, &reference.name);
         print(&(text + &told.text()))?;
     }
-    if exceeded {
+    if let Some(limit) = exceeded {
         tracing::error!(
-            "the largest error, {} deg, exceeds --max-angle {} deg",
-            significant(errors.total.max.to_degrees(), 4),
-            args.max_angle.unwrap_or(0.0)
+            "the largest error, {} deg, exceeds --max-angle {limit} deg",
+            significant(largest, 4)
         );
         return Ok(Outcome::LimitExceeded);
     }
     Ok(Outcome::Done)
+}
+
+impl Compare {
+    /// Checks that the limit is an angle, and that the chart can be one.
+    fn check(&self) -> Result<()> {
+        if self
+            .max_angle
+            .is_some_and(|limit| limit.is_nan() || limit < 0.0)
+        {
+            return Err(Error::usage(
+                "--max-angle: an angle of 0 degrees or more".to_owned(),
+            ));
+        }
+        self.plot
+            .iter()
+            .try_for_each(|p| super::outputs::check_chart(p))
+    }
+
+    /// Reads the estimate and the reference, and says what is wrong with the two.
+    fn read(&self, pool: &Pool) -> Result<(Track, Track)> {
+        if self.estimate == self.reference && self.estimate.as_os_str() == "-" {
+            return Err(Error::usage(
+                Diagnostic::new("compare - -: standard input comes once")
+                    .help("give one of the two a file"),
+            ));
+        }
+        let mut options = Options::default();
+        self.tables.put(&mut options)?;
+        let read = |path: &Path, side, topic: &Option<String>| {
+            attitude_track::read(
+                &opening::open(path)?,
+                side,
+                topic.as_deref(),
+                &options,
+                pool,
+            )
+        };
+        let estimate = read(&self.estimate, Side::Estimate, &self.topic)?;
+        let reference = read(&self.reference, Side::Reference, &self.ref_topic)?;
+        for problem in estimate.problems.iter().chain(&reference.problems) {
+            tracing::warn!("{problem}");
+        }
+        Ok((estimate, reference))
+    }
 }
 
 /// Text about the errors beside their size.
@@ -174,7 +183,7 @@ const OTHER_AXES: f64 = 0.7;
 
 impl ErrorExplanation {
     fn of(
-        estimate: &attitude_track::Track,
+        estimate: &Track,
         (estimated, referred): (&[Stamped], Reference<'_>),
         align: Align,
     ) -> ErrorExplanation {
@@ -266,7 +275,7 @@ fn chart(estimate: &[Stamped], reference: Reference<'_>, align: Align, errors: &
 }
 
 /// Attitudes of a track. A row that is no rotation becomes one with NaN, so that the comparison counts it.
-pub(super) fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
+pub(super) fn attitudes(track: &Track) -> Vec<Stamped> {
     track
         .entries
         .iter()
@@ -280,11 +289,8 @@ pub(super) fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
 }
 
 /// Error of two tracks without an instant in common.
-pub(super) fn no_match(
-    estimate: &attitude_track::Track,
-    reference: &attitude_track::Track,
-) -> Error {
-    let span = |t: &attitude_track::Track| match (t.entries.first(), t.entries.last()) {
+pub(super) fn no_match(estimate: &Track, reference: &Track) -> Error {
+    let span = |t: &Track| match (t.entries.first(), t.entries.last()) {
         (Some((a, _)), Some((b, _))) => {
             format!(
                 "{}: {} attitudes, {} to {} ns",

@@ -1,38 +1,31 @@
 //! `strapd replay SOURCE... -o SINK...`: recorded samples -> attitude. I/O.
 
-use super::calibration_files;
+mod calibration;
+mod request;
+mod words;
+
 use super::continued;
 use super::estimation::Estimation;
 use super::frames::{BaseFrame, Frames};
 use super::known_words;
 use super::own_output;
 use super::progress::Reporter;
-use super::serving::{Served, Serving};
+use super::serving::Serving;
 use super::setting_args::{Given, Smoothing};
 use super::tables::Tables;
-use super::{Global, Outcome, outputs, print};
+use super::{Global, Outcome, outputs};
 use crate::config::Shard;
 use crate::error::{Error, Result};
-use crate::pipeline::attitude_track::{self, Side, Track};
-use crate::pipeline::opening;
 use crate::pipeline::replay;
-use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
-use crate::sink::{Compression, Encoding, Format, Options, Precision, Target};
+use crate::sink::{Compression, Format};
 use clap::{Args, ValueEnum};
-use std::ffi::OsString;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::EstimationSettings;
-use strapd_attitude::record::Nanos;
-use strapd_attitude::setting::{BIAS, SMOOTH};
+use strapd_attitude::setting::SMOOTH;
 use strapd_recording::Selection;
-use strapd_recording::Source;
-use strapd_recording::decode::Options as DecodeOptions;
 use strapd_recording::pool::Pool;
-use strapd_recording::recording::instants::Instants;
 
 /// Turn recorded gyro samples into attitude.
 #[derive(Args, Debug)]
@@ -169,8 +162,8 @@ pub enum CompressionArg {
 }
 
 impl From<CompressionArg> for Compression {
-    fn from(named: CompressionArg) -> Compression {
-        match named {
+    fn from(arg: CompressionArg) -> Compression {
+        match arg {
             CompressionArg::Zstd => Compression::Zstd,
             CompressionArg::Lz4 => Compression::Lz4,
             CompressionArg::None => Compression::None,
@@ -202,38 +195,8 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
     let is_of_one = args.sources.len() == 1;
     args.check_values()?;
     args.sources = own_output::without(args.sources, args.estimation.topic.as_deref())?;
-    let args = &args;
-    let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
-    if args.join && shard.is_some() {
-        return Err(Error::usage(
-            Diagnostic::new("--join: one recording, of which --shard has no share")
-                .help("leave one of the two out"),
-        ));
-    }
-    let recordings = args.recordings();
-    let logs: Vec<&String> = recordings
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| shard.is_none_or(|s| s.takes(*i)))
-        .map(|(_, log)| log)
-        .collect();
-    if global.json && writes_stdout(args) {
-        return Err(Error::usage(
-            Diagnostic::new("--json and -o - would both write to stdout")
-                .help("give the attitude a file name"),
-        ));
-    }
-    if let (Some(path), [_, _, ..]) = (&args.reference, recordings) {
-        let what = format!("--reference {} is of one log", path.display());
-        return Err(Error::usage(Diagnostic::new(what).help("give one SOURCE")));
-    }
-    if recordings.len() > 1 && args.serving.page.is_some() {
-        return Err(Error::usage(
-            Diagnostic::new("--page: one log at a time").help("give one SOURCE"),
-        ));
-    }
-    outputs::check_distinct(&args.outputs, recordings)?;
-    args.check_calibrations(&logs)?;
+    let logs = args.logs()?;
+    args.check(global, &logs)?;
     let plan = args
         .estimation
         .plan_of_a_recording(args.smoothing.is(SMOOTH, "true"))?;
@@ -243,26 +206,7 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();
     for log in &logs {
-        let result = outputs::resolve(&args.outputs, log, recordings.len())
-            .and_then(|names| {
-                let run = args.run(log, &names, (selection.clone(), plan.clone()), &pool)?;
-                outputs::make_folders(&args.outputs, &names)?;
-                Ok(run)
-            })
-            .and_then(|(mut run, mut served)| {
-                served.look_through(&run, global.threads);
-                served.run(|again| {
-                    if again {
-                        run.targets.retain(|target| target.listens().is_some());
-                    }
-                    let mut reporter = Reporter::new(global, &outputs::shown(log));
-                    let result =
-                        replay::run(&run, &pool, &mut |position| reporter.update(position));
-                    reporter.finish();
-                    result
-                })
-            });
-        match result {
+        match args.run_one(global, log, (&selection, &plan), &pool) {
             Ok((summary, _)) if !summary.broken.is_empty() && summary.reader_gone => {
                 return Ok(Outcome::Lossy);
             }
@@ -276,7 +220,7 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
                 if summary.is_lossy() && outcome == Outcome::Done {
                     outcome = Outcome::Lossy;
                 }
-                say(global, args, &summary)?;
+                args.say(global, &summary)?;
                 summaries.push(summary);
             }
             Err(error) if logs.len() > 1 && !error.is_broken_pipe() && error.exit_code() != 2 => {
@@ -290,7 +234,7 @@ pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
         tracing::warn!("{said}");
     }
     if global.json {
-        say_json(is_of_one, &summaries)?;
+        words::say_json(is_of_one, &summaries)?;
     }
     Ok(outcome)
 }
@@ -325,289 +269,70 @@ impl Replay {
         Ok(())
     }
 
-    /// Path for the calibration of a log.
-    fn calibration_file(&self, log: &str) -> Option<String> {
-        let name = self.save_calibration.as_ref()?;
-        Some(name.replace("{stem}", &outputs::stem(log)))
+    /// Logs of this share of the recordings.
+    fn logs(&self) -> Result<Vec<&String>> {
+        let shard = self.shard.as_deref().map(Shard::parse).transpose()?;
+        if self.join && shard.is_some() {
+            return Err(Error::usage(
+                Diagnostic::new("--join: one recording, of which --shard has no share")
+                    .help("leave one of the two out"),
+            ));
+        }
+        Ok(self
+            .recordings()
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| shard.is_none_or(|s| s.takes(*i)))
+            .map(|(_, log)| log)
+            .collect())
     }
 
-    /// Checks that each log has a file for its calibration, and each calibration is of one sensor.
-    fn check_calibrations(&self, logs: &[&String]) -> Result<()> {
-        let Some(name) = &self.save_calibration else {
-            return Ok(());
-        };
-        let wrong = |what: &str, help: &str| {
-            let what = format!("--save-calibration {name}: {what}");
-            Err(Error::usage(Diagnostic::new(what).help(help)))
-        };
-        if self.recordings().len() > 1 && !name.contains("{stem}") {
-            return wrong(
-                "each log would be saved there",
-                "a name with {stem}, for example {stem}.calibration.toml",
-            );
+    /// Checks that no two outputs share a place, and that what is of one log alone is asked for one.
+    fn check(&self, global: &Global, logs: &[&String]) -> Result<()> {
+        let recordings = self.recordings();
+        if global.json && self.writes_stdout() {
+            return Err(Error::usage(
+                Diagnostic::new("--json and -o - would both write to stdout")
+                    .help("give the attitude a file name"),
+            ));
         }
-        if self.estimation.topic.as_deref() == Some("all") {
-            return wrong("a calibration is of one sensor", "--topic NAME");
+        if let (Some(path), [_, _, ..]) = (&self.reference, recordings) {
+            let what = format!("--reference {} is of one log", path.display());
+            return Err(Error::usage(Diagnostic::new(what).help("give one SOURCE")));
         }
-        if self.estimation.is_unaided() && !self.estimation.settings.is(BIAS, "auto") {
-            return wrong(
-                "the gyro alone learns nothing",
-                "--aid gravity, or --bias auto for the bias of a rest",
-            );
+        if recordings.len() > 1 && self.serving.page.is_some() {
+            return Err(Error::usage(
+                Diagnostic::new("--page: one log at a time").help("give one SOURCE"),
+            ));
         }
-        let files = logs.iter().filter_map(|log| self.calibration_file(log));
-        files.map(PathBuf::from).try_for_each(|file| {
-            if outputs::is_pattern(name) {
-                outputs::make_folder(&file)?;
+        outputs::check_distinct(&self.outputs, recordings)?;
+        self.check_calibrations(logs)
+    }
+
+    fn writes_stdout(&self) -> bool {
+        self.outputs.iter().any(|output| output == "-")
+    }
+
+    /// Replays one log: once, and again as often as whoever is served asks for it.
+    fn run_one(
+        &self,
+        global: &Global,
+        log: &str,
+        (selection, plan): (&Selection, &EstimationSettings),
+        pool: &Pool,
+    ) -> Result<(RunSummary, Outcome)> {
+        let names = outputs::resolve(&self.outputs, log, self.recordings().len())?;
+        let (mut request, mut served) = self.request(log, &names, (selection, plan), pool)?;
+        outputs::make_folders(&self.outputs, &names)?;
+        served.look_through(&request, global.threads);
+        served.run(|again| {
+            if again {
+                request.targets.retain(|target| target.listens().is_some());
             }
-            calibration_files::check_target(&file, self.force)
+            let mut reporter = Reporter::new(global, &outputs::shown(log));
+            let result = replay::run(&request, pool, &mut |position| reporter.update(position));
+            reporter.finish();
+            result
         })
     }
-
-    fn save_calibration(&self, log: &str, summary: &mut RunSummary) -> Result<()> {
-        let Some(file) = self.calibration_file(log) else {
-            return Ok(());
-        };
-        let [topic] = summary.topics.as_slice() else {
-            return Err(Error::usage(
-                Diagnostic::new(format!(
-                    "--save-calibration {file}: {} sensors, and a calibration is of one",
-                    summary.topics.len()
-                ))
-                .help("--topic NAME"),
-            ));
-        };
-        calibration_files::write(Path::new(&file), &topic.calibration)?;
-        summary.calibration = Some(file);
-        Ok(())
-    }
-
-    /// The reference from another file, if one is given: attitudes as `compare` reads them.
-    fn read_reference(&self, pool: &Pool) -> Result<Option<Arc<Track>>> {
-        let Some(path) = &self.reference else {
-            return Ok(None);
-        };
-        let input = opening::open(path)?;
-        let track = attitude_track::read(
-            &input,
-            Side::Reference,
-            None,
-            &DecodeOptions::default(),
-            pool,
-        )?;
-        for problem in &track.problems {
-            tracing::warn!("{problem}");
-        }
-        Ok(Some(Arc::new(track)))
-    }
-
-    /// The file of a recording that is read beforehand, too.
-    fn file_read_twice<'s>(source: &'s Source, asked: &str) -> Result<&'s Path> {
-        match source {
-            Source::File(path) => Ok(path),
-            _ => {
-                let what = format!("{asked}: the recording is to be one file, which is read twice");
-                Err(Error::usage(Diagnostic::new(what).help("keep it as one")))
-            }
-        }
-    }
-
-    /// The instants at which attitudes are wanted, if somebody says any.
-    fn read_instants(
-        &self,
-        source: &Source,
-        options: &DecodeOptions,
-        pool: &Pool,
-    ) -> Result<Option<Arc<[Nanos]>>> {
-        let Some(asked) = &self.at else {
-            return Ok(None);
-        };
-        let instants = Instants::named(asked);
-        let path = match &instants {
-            Instants::Table(path) => path,
-            Instants::Frames | Instants::Topic(_) => {
-                Self::file_read_twice(source, &format!("--at {asked}"))?
-            }
-        };
-        let (read, note) = instants.read(path, options, pool)?;
-        if let Some(note) = note {
-            tracing::warn!("{note}");
-        }
-        Ok(Some(read.into()))
-    }
-
-    /// The run for one log.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for a flag that cannot be.
-    fn run(
-        &self,
-        log: &str,
-        outputs: &[String],
-        (selection, mut plan): (Selection, EstimationSettings),
-        pool: &Pool,
-    ) -> Result<(ReplayRequest, Served)> {
-        if self
-            .out_rate
-            .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
-        {
-            return Err(Error::usage("--out-rate: a rate above 0 Hz".to_owned()));
-        }
-        let targets = outputs
-            .iter()
-            .map(|o| Target::parse(o))
-            .collect::<Result<_>>()?;
-        let source = match self.sources.as_slice() {
-            several @ [_, _, ..] if self.join => {
-                Source::Parts(several.iter().map(PathBuf::from).collect())
-            }
-            _ => Source::parse(log),
-        };
-        if let Some(base) = &self.base.base_frame {
-            let path = Self::file_read_twice(&source, &format!("--base-frame {base}"))?;
-            let input = opening::open(path)?;
-            self.base.put(&mut plan, (&input, &selection), pool)?;
-        }
-        let reference = self.read_reference(pool)?;
-        let instants = self.read_instants(&source, &selection.decode, pool)?;
-        let can_rewind = match &source {
-            Source::File(path) => path.is_file(),
-            Source::Parts(_) => true,
-            Source::Stdin => false,
-            Source::Elsewhere(_) => true,
-        };
-        let body = self.base.base_frame.as_ref().or(self.frame_id.as_ref());
-        let frames = self.frames.names(body.cloned());
-        let served = self.serving.start(
-            targets,
-            self.speed.as_deref(),
-            (&outputs::shown(log), can_rewind, false),
-            &frames,
-        )?;
-        let run = ReplayRequest {
-            source,
-            targets: served.targets.clone(),
-            audience: served.audience(),
-            selection,
-            plan,
-            options: Options {
-                force: self.force,
-                encoding: match self.encoding {
-                    EncodingArg::Cdr => Encoding::Cdr,
-                    EncodingArg::Json => Encoding::Json,
-                },
-                compression: self.compression.into(),
-                precision: self.precision(),
-            },
-            copy_input: self.copy_input,
-            out_rate: self.out_rate,
-            instants,
-            frames,
-            speed: served.speed,
-            against: match (&self.against_recorded, &reference) {
-                (None, Some(_)) => Some(String::new()),
-                (asked, _) => asked.clone(),
-            },
-            reference,
-            command: super::shell::recorded_command(self.record_paths),
-            record_paths: self.record_paths,
-        };
-        Ok((run, served))
-    }
-}
-
-impl Replay {
-    #[cfg(feature = "parquet")]
-    fn precision(&self) -> Precision {
-        match self.parquet_f32 {
-            true => Precision::Single,
-            false => Precision::Double,
-        }
-    }
-
-    #[cfg(not(feature = "parquet"))]
-    fn precision(&self) -> Precision {
-        Precision::default()
-    }
-}
-
-/// The text summary: on stdout, or on stderr when the data or JSON is there.
-fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
-    if global.quiet {
-        say_warnings(summary);
-        return Ok(());
-    }
-    let text = match global.verbose {
-        0 => format!("{}{}", summary.brief(), next(summary, args.join)),
-        _ => summary.text(),
-    };
-    if global.json || writes_stdout(args) {
-        // A stderr that is gone leaves nobody to tell.
-        let _ = std::io::stderr().write_all(text.as_bytes());
-        return Ok(());
-    }
-    print(&text)
-}
-
-const NOTHING_NEXT: &str = "  next     -v prints all of this summary\n";
-
-/// Line about what to do next.
-fn next(summary: &RunSummary, is_joined: bool) -> String {
-    if Path::new(&summary.source) == Source::Stdin.name() {
-        // It is gone: there is nothing that a command could read again.
-        return NOTHING_NEXT.to_owned();
-    }
-    // No other command takes several files as one recording.
-    if is_joined {
-        return NOTHING_NEXT.to_owned();
-    }
-    let log = strapd_replay::shell::quoted(OsString::from(&summary.source));
-    let has_more = summary.is_lossy() || summary.topics.iter().any(|t| !t.warnings().is_empty());
-    match has_more {
-        true => format!(
-            "  next     strapd check {log}  (what is wrong and what helps; -v prints all of this summary)\n"
-        ),
-        false => format!(
-            "  next     strapd report {log} -o report.html  (pictures; -v prints all of this summary)\n"
-        ),
-    }
-}
-
-/// Prints what `--quiet` leaves: why the exit code is 3, and the warnings.
-fn say_warnings(summary: &RunSummary) {
-    let source = &summary.source;
-    for topic in &summary.topics {
-        let lost = topic.counts.lost();
-        if lost > 0 {
-            let total = topic.counts.total();
-            tracing::warn!("{source}: {}: lost {lost} of {total} samples", topic.topic);
-        }
-        let breaks = topic.gaps.held + topic.gaps.resets;
-        if breaks > 0 {
-            tracing::warn!(
-                "{source}: {}: {breaks} gaps were not integrated over, {:.3} s in all",
-                topic.topic,
-                topic.gaps.held_secs
-            );
-        }
-        for warning in topic.warnings() {
-            tracing::warn!("{source}: {}: {warning}", topic.topic);
-        }
-    }
-    for problem in &summary.file_problems {
-        tracing::warn!("{source}: {problem}");
-    }
-}
-
-/// One object for one log, an array for several.
-fn say_json(is_of_one: bool, summaries: &[RunSummary]) -> Result<()> {
-    let value = match summaries {
-        [one] if is_of_one => one.json(),
-        many => many.iter().map(RunSummary::json).collect(),
-    };
-    print(&format!("{value}\n"))
-}
-
-fn writes_stdout(args: &Replay) -> bool {
-    args.outputs.iter().any(|o| o == "-")
 }

@@ -80,44 +80,14 @@ pub struct Report {
 pub fn run(global: &Global, mut args: Report) -> Result<Outcome> {
     args.files = own_output::without(args.files, args.estimation.topic.as_deref())?;
     let args = &args;
-    let output = args.output.as_deref();
-    match output {
-        None if !global.json => {
-            return Err(Error::usage(Diagnostic::new("report: where to?").help(
-                "-o report.html writes the page, --json prints the numbers alone",
-            )));
-        }
-        Some(path) if global.json && path.as_os_str() == "-" => {
-            return Err(Error::usage(
-                Diagnostic::new("--json and -o - would both write to stdout")
-                    .help("give the page a file name"),
-            ));
-        }
-        _ => {}
-    }
-    let ending = output
-        .and_then(Path::extension)
-        .map(|ending| ending.to_ascii_lowercase());
-    if let (Some(path), Some(ending)) = (output, ending)
-        && ["pdf", "png", "svg", "jpg", "docx", "md"]
-            .iter()
-            .any(|other| ending == *other)
-    {
-        let what = format!("-o {}: a report is HTML", path.display());
-        let help = "-o report.html; a browser prints it, as PDF too";
-        return Err(Error::usage(Diagnostic::new(what).help(help)));
-    }
-    if let (Some(path), [_, _, ..]) = (&args.reference, args.files.as_slice()) {
-        let what = format!("--reference {} is of one log", path.display());
-        return Err(Error::usage(Diagnostic::new(what).help(
-            "one log, or --ref-topic NAME for a reference in each of them",
-        )));
-    }
+    args.check_output(global)?;
+    args.check_reference()?;
     let plan = args
         .estimation
         .plan_of_a_recording(args.smoothing.is(SMOOTH, "true"))?;
     let mut selection = args.estimation.selection()?;
     args.tables.put(&mut selection.decode)?;
+    let output = args.output.as_deref();
     let inputs: Vec<PathBuf> = args.files.iter().chain(&args.reference).cloned().collect();
     let document = output
         .map(|path| Document::create(path, &inputs, args.force))
@@ -137,36 +107,9 @@ pub fn run(global: &Global, mut args: Report) -> Result<Outcome> {
         }),
         command: super::shell::recorded_command(args.record_paths),
     };
-    let mut html = String::new();
-    let outcome = match args.files.as_slice() {
-        [file] => args.with_page(global, file, (&asked, &pool), &mut |page| {
-            if document.is_some() {
-                html = page.html();
-                tracing::info!("{}", page.sentence());
-            }
-            said(global, page)
-        })?,
-        files => {
-            let mut several = Several::of(files.len());
-            let outcome = with_each(files, |file| {
-                let done = args.with_page(global, file, (&asked, &pool), &mut |page| {
-                    several.add(page);
-                    tracing::info!("{}: {}", page.file, page.sentence());
-                    said(global, page)
-                });
-                if let Err(why) = &done {
-                    let name = args.shown(file);
-                    let why = why.to_string().replace('\n', " ");
-                    several.add_unread(&name, &why.replace(&file.display().to_string(), &name));
-                }
-                done
-            })?;
-            if document.is_some() {
-                html = several.html();
-                tracing::info!("{} logs: {}", files.len(), several.sentence());
-            }
-            outcome
-        }
+    let (outcome, html) = match args.files.as_slice() {
+        [file] => args.one(global, file, (&asked, &pool))?,
+        files => args.several(global, files, (&asked, &pool))?,
     };
     if let (Some(document), Some(path)) = (document, output) {
         document.write(&html)?;
@@ -187,6 +130,97 @@ fn said(global: &Global, page: &Page<'_>) -> Result<Outcome> {
 }
 
 impl Report {
+    /// Checks that the page or its numbers have somewhere to go, and that the name of the page fits it.
+    fn check_output(&self, global: &Global) -> Result<()> {
+        let output = self.output.as_deref();
+        match output {
+            None if !global.json => {
+                return Err(Error::usage(Diagnostic::new("report: where to?").help(
+                    "-o report.html writes the page, --json prints the numbers alone",
+                )));
+            }
+            Some(path) if global.json && path.as_os_str() == "-" => {
+                return Err(Error::usage(
+                    Diagnostic::new("--json and -o - would both write to stdout")
+                        .help("give the page a file name"),
+                ));
+            }
+            _ => {}
+        }
+        let ending = output
+            .and_then(Path::extension)
+            .map(|ending| ending.to_ascii_lowercase());
+        if let (Some(path), Some(ending)) = (output, ending)
+            && ["pdf", "png", "svg", "jpg", "docx", "md"]
+                .iter()
+                .any(|other| ending == *other)
+        {
+            let what = format!("-o {}: a report is HTML", path.display());
+            let help = "-o report.html; a browser prints it, as PDF too";
+            return Err(Error::usage(Diagnostic::new(what).help(help)));
+        }
+        Ok(())
+    }
+
+    /// Checks that a reference of one log is given with no other.
+    fn check_reference(&self) -> Result<()> {
+        if let (Some(path), [_, _, ..]) = (&self.reference, self.files.as_slice()) {
+            let what = format!("--reference {} is of one log", path.display());
+            return Err(Error::usage(Diagnostic::new(what).help(
+                "one log, or --ref-topic NAME for a reference in each of them",
+            )));
+        }
+        Ok(())
+    }
+
+    /// Examines the only log. The page is empty where none is to be written.
+    fn one(
+        &self,
+        global: &Global,
+        file: &Path,
+        (asked, pool): (&Examination<'_>, &Pool),
+    ) -> Result<(Outcome, String)> {
+        let mut html = String::new();
+        let outcome = self.with_page(global, file, (asked, pool), &mut |page| {
+            if self.output.is_some() {
+                html = page.html();
+                tracing::info!("{}", page.sentence());
+            }
+            said(global, page)
+        })?;
+        Ok((outcome, html))
+    }
+
+    /// Examines logs one by one, side by side in one page; what cannot be read stands in it, too. The page is empty where
+    /// none is to be written.
+    fn several(
+        &self,
+        global: &Global,
+        files: &[PathBuf],
+        (asked, pool): (&Examination<'_>, &Pool),
+    ) -> Result<(Outcome, String)> {
+        let mut several = Several::of(files.len());
+        let outcome = with_each(files, |file| {
+            let done = self.with_page(global, file, (asked, pool), &mut |page| {
+                several.add(page);
+                tracing::info!("{}: {}", page.file, page.sentence());
+                said(global, page)
+            });
+            if let Err(why) = &done {
+                let name = self.shown(file);
+                let why = why.to_string().replace('\n', " ");
+                several.add_unread(&name, &why.replace(&file.display().to_string(), &name));
+            }
+            done
+        })?;
+        let mut html = String::new();
+        if self.output.is_some() {
+            html = several.html();
+            tracing::info!("{} logs: {}", files.len(), several.sentence());
+        }
+        Ok((outcome, html))
+    }
+
     /// Name of a file in the page, which is shown to others.
     fn shown(&self, file: &Path) -> String {
         match (self.record_paths, file.file_name()) {

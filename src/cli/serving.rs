@@ -43,6 +43,17 @@ pub struct Serving {
     pub admission: Admission,
 }
 
+/// Input of a run that is to be served.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Played<'a> {
+    /// Name of it.
+    pub(super) name: &'a str,
+    /// Whether it can be played again.
+    pub(super) can_rewind: bool,
+    /// Whether it brings samples beside attitudes.
+    pub(super) brings_samples: bool,
+}
+
 /// A run to be served, and how.
 #[derive(Debug)]
 pub(super) struct Served {
@@ -75,8 +86,7 @@ impl Drop for Looking {
 }
 
 impl Serving {
-    /// Starts the server, if a target listens. `speed` is what was given; `source` what is played, whether it can be
-    /// played again, and whether it brings samples beside attitudes; `frames` names its frames.
+    /// Starts the server, if a target listens. `speed` is what was given; `frames` names the frames of what is played.
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag; [`Error::Bind`].
@@ -84,27 +94,61 @@ impl Serving {
         &self,
         mut targets: Vec<Target>,
         speed: Option<&str>,
-        (source, can_rewind, brings_samples): (&str, bool, bool),
+        played: Played<'_>,
         frames: &FrameNames,
     ) -> Result<Served> {
-        if let Some(page) = &self.page {
-            // A port alone is one of this machine.
-            let of_here = if page.parse::<u16>().is_ok() { ":" } else { "" };
-            targets.push(Target::Listen(Listen::parse_from(
-                "--page",
-                &format!("ws-listen://{of_here}{page}"),
-            )?));
-        }
-        let speed = match speed {
-            Some(text) => replay::speed(text)?,
-            None if self.page.is_some() || self.paused => Some(1.0),
-            None => None,
-        };
+        targets.extend(self.page_target()?);
+        let speed = self.speed(speed)?;
         let listen: Vec<Listen> = targets
             .iter()
             .filter_map(Target::listens)
             .cloned()
             .collect();
+        self.check(&listen, speed, played)?;
+        let cast = if listen.is_empty() {
+            None
+        } else {
+            let playback = self.playback(played, speed, targets.len() - listen.len());
+            let hub = hub::Settings {
+                brings_samples: played.brings_samples,
+                frames: frames.clone(),
+                ..hub::Settings::default()
+            };
+            Some(Arc::new(self.start_cast(listen, playback, hub)?))
+        };
+        Ok(Served {
+            targets,
+            speed,
+            cast,
+            looping: self.looping,
+            can_rewind: played.can_rewind,
+            has_page: self.page.is_some(),
+            overview: None,
+        })
+    }
+
+    /// Target that `--page` stands for.
+    fn page_target(&self) -> Result<Option<Target>> {
+        let Some(page) = &self.page else {
+            return Ok(None);
+        };
+        // A port alone is one of this machine.
+        let of_here = if page.parse::<u16>().is_ok() { ":" } else { "" };
+        let listen = Listen::parse_from("--page", &format!("ws-listen://{of_here}{page}"))?;
+        Ok(Some(Target::Listen(listen)))
+    }
+
+    /// Speed of the run: what was given, else that of data where somebody is to look on.
+    fn speed(&self, speed: Option<&str>) -> Result<Option<f64>> {
+        match speed {
+            Some(text) => replay::speed(text),
+            None if self.page.is_some() || self.paused => Ok(Some(1.0)),
+            None => Ok(None),
+        }
+    }
+
+    /// Checks that what is asked for can be done.
+    fn check(&self, listen: &[Listen], speed: Option<f64>, played: Played<'_>) -> Result<()> {
         for (given, flag) in [(self.paused, "--paused"), (self.looping, "--loop")] {
             if given && listen.is_empty() {
                 return Err(Error::usage(
@@ -119,66 +163,63 @@ impl Serving {
                     .help("--speed 1"),
             ));
         }
-        if self.looping && !can_rewind {
+        if self.looping && !played.can_rewind {
             return Err(Error::usage(
-                Diagnostic::new(format!("--loop: {source} can be read only once"))
+                Diagnostic::new(format!("--loop: {} can be read only once", played.name))
                     .help("give it as a file"),
             ));
         }
-        let cast = if listen.is_empty() {
-            None
+        Ok(())
+    }
+
+    /// Position of the run and who may change it; `others` = targets that do not listen.
+    fn playback(&self, played: Played<'_>, speed: Option<f64>, others: usize) -> Playback {
+        // Nobody is to come too late; but a file beside, a stream and --loop go on without anybody.
+        let is_awaited = self.page.is_some() && !played.brings_samples && played.can_rewind;
+        let is_paused =
+            self.paused || (is_awaited && others == 0 && !self.looping && speed.is_some());
+        // Who connects has no need of the folder.
+        let name = Path::new(played.name)
+            .file_name()
+            .map(|name| name.to_string_lossy());
+        let name = name.as_deref().unwrap_or(played.name);
+        let playback = Playback::new(name, speed, is_paused);
+        playback.forward_only(if !played.can_rewind {
+            Some("the input can be read only once, so there is no way back")
+        } else if others > 0 {
+            Some("the run also writes outputs that are not complete yet; there is a way back after the end")
         } else {
-            let others = targets.len() - listen.len();
-            // Nobody is to come too late; but a file beside, a stream and --loop go on without anybody.
-            let is_awaited = self.page.is_some() && !brings_samples && can_rewind;
-            let is_paused =
-                self.paused || (is_awaited && others == 0 && !self.looping && speed.is_some());
-            // Who connects has no need of the folder.
-            let name = Path::new(source)
-                .file_name()
-                .map(|name| name.to_string_lossy());
-            let name = name.as_deref().unwrap_or(source);
-            let playback = Playback::new(name, speed, is_paused);
-            playback.forward_only(if !can_rewind {
-                Some("the input can be read only once, so there is no way back")
-            } else if others > 0 {
-                Some("the run also writes outputs that are not complete yet; there is a way back after the end")
-            } else {
-                None
-            });
-            let settings = Settings {
-                hub: hub::Settings {
-                    brings_samples,
-                    frames: frames.clone(),
-                    ..hub::Settings::default()
-                },
-                listen: listen.into_iter().map(Into::into).collect(),
-                ..Settings::default()
-            };
-            let settings = self.admission.apply(settings, false)?;
-            let cast = PlaybackServer::start(settings, playback, self.page.is_some(), true)?;
-            let addresses: Vec<String> = cast.addresses().iter().map(ToString::to_string).collect();
-            tracing::info!(
-                session = cast.hub().session(),
-                "ready {}",
-                addresses.join(" ")
-            );
-            if self.page.is_some()
-                && let Some(Listen::WebSocket(page)) = cast.addresses().last()
-            {
-                tracing::info!("page http://{page}/");
-            }
-            Some(Arc::new(cast))
+            None
+        });
+        playback
+    }
+
+    /// Starts the server, and says where it is.
+    fn start_cast(
+        &self,
+        listen: Vec<Listen>,
+        playback: Playback,
+        hub: hub::Settings,
+    ) -> Result<PlaybackServer> {
+        let settings = Settings {
+            hub,
+            listen: listen.into_iter().map(Into::into).collect(),
+            ..Settings::default()
         };
-        Ok(Served {
-            targets,
-            speed,
-            cast,
-            looping: self.looping,
-            can_rewind,
-            has_page: self.page.is_some(),
-            overview: None,
-        })
+        let settings = self.admission.apply(settings, false)?;
+        let cast = PlaybackServer::start(settings, playback, self.page.is_some(), true)?;
+        let addresses: Vec<String> = cast.addresses().iter().map(ToString::to_string).collect();
+        tracing::info!(
+            session = cast.hub().session(),
+            "ready {}",
+            addresses.join(" ")
+        );
+        if self.page.is_some()
+            && let Some(Listen::WebSocket(page)) = cast.addresses().last()
+        {
+            tracing::info!("page http://{page}/");
+        }
+        Ok(cast)
     }
 }
 

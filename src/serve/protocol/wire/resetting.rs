@@ -1,6 +1,7 @@
 //! `RESET` lines -> what is asked, and its answer. Pure.
 
-use super::{Fault, NAMELESS, line, name, object};
+use super::answers::line;
+use super::{Fault, NAMELESS, name, object};
 use crate::config::parse_initial;
 use bytes::Bytes;
 use serde::Deserialize;

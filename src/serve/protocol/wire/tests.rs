@@ -1,6 +1,8 @@
 //! Tests of what a line asks for, and of the lines that answer.
 
 use super::*;
+use serde_json::Value;
+use strapd_recording::text::snippet;
 
 fn ask(text: &str) -> Result<Message, Fault> {
     let mut samples = Vec::new();
