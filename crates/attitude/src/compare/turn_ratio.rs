@@ -86,6 +86,7 @@ fn each_turn(estimate: &Track<'_>, reference: &Track<'_>, mut visit: impl FnMut(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::frames::{Body, Nav};
