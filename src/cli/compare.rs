@@ -17,7 +17,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use strapd_attitude::compare::{
     Align, BiasFit, BodyAxesFit, Comparison, Consistency, ErrorStats, Errors, Reference, Stamped,
-    UncertainAttitude, compare, consistency, fit_body_axes, fit_constant_bias, for_each_error,
+    TimeShift, UncertainAttitude, compare, consistency, fit_body_axes, fit_constant_bias,
+    fit_time_shift, for_each_error,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
@@ -176,6 +177,8 @@ struct ErrorExplanation {
     bias: Option<BiasFit>,
     /// The body axes that do.
     axes: Option<BodyAxesFit>,
+    /// The shift of the reference's clock that does, and of which the two above would be effects.
+    shift: Option<TimeShift>,
 }
 
 /// Errors over a second that other axes explain to this share are no bias.
@@ -196,7 +199,9 @@ impl ErrorExplanation {
                 covariance: *covariance,
             })
             .collect();
-        let axes = fit_body_axes(estimated, referred.rows);
+        let shift = fit_time_shift(estimated, referred);
+        let is_one_clock = shift.is_none();
+        let axes = fit_body_axes(estimated, referred.rows).filter(|_| is_one_clock);
         // About one axis alone a bias and other axes cannot be told apart.
         let is_bias = |fit: &BiasFit| {
             fit.is_worth_removing()
@@ -206,8 +211,9 @@ impl ErrorExplanation {
         };
         ErrorExplanation {
             sigma: consistency(&known, referred, align, |_| {}),
-            bias: fit_constant_bias(estimated, referred).filter(is_bias),
+            bias: fit_constant_bias(estimated, referred).filter(|fit| is_one_clock && is_bias(fit)),
             axes: axes.filter(BodyAxesFit::are_others),
+            shift,
         }
     }
 
@@ -218,6 +224,10 @@ impl ErrorExplanation {
             if let Some(beyond) = against::beyond_sigma(found) {
                 let _ = writeln!(out, "  verdict  {beyond}");
             }
+        }
+        if let Some(shift) = &self.shift {
+            let words = against::shift_words(shift, "the reference");
+            let _ = writeln!(out, "  clock    {words}; compare does not move it");
         }
         if let Some(fit) = &self.axes {
             let _ = writeln!(
@@ -393,6 +403,10 @@ fn as_json(
         object.insert(
             "other_axes".to_owned(),
             told.axes.as_ref().map(against::axes_json).into(),
+        );
+        object.insert(
+            "late_s".to_owned(),
+            told.shift.map(|shift| shift.late_secs).into(),
         );
     }
     value

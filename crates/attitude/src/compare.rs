@@ -19,6 +19,7 @@ pub(crate) mod matching;
 mod reference;
 mod relative;
 mod statistics;
+mod time_shift;
 mod turn_ratio;
 
 pub use align::{Align, ParseAlignError};
@@ -28,7 +29,8 @@ pub use constant_bias::{BiasFit, fit_constant_bias};
 pub use reference::Reference;
 pub use relative::RelativeError;
 pub use statistics::{Drift, ErrorStats};
-pub use turn_ratio::turn_ratio;
+pub use time_shift::{TimeShift, fit_time_shift};
+pub use turn_ratio::{TurnRatio, turn_ratio};
 
 use crate::frames::{Body, Nav};
 use crate::quaternion::{Quaternion, RotationVector};

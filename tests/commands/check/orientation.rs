@@ -292,7 +292,11 @@ fn gyro_alone(dir: &Path, size: f64, factor: f64) {
 
 /// Code, severity and first advice of what is wrong in the log by these flags.
 fn wrong(dir: &Path, flags: &str) -> Vec<[String; 3]> {
-    let ran = strapd(dir, &format!("check gyro.csv --json {flags}"));
+    wrong_in(dir, "gyro.csv", flags)
+}
+
+fn wrong_in(dir: &Path, log: &str, flags: &str) -> Vec<[String; 3]> {
+    let ran = strapd(dir, &format!("check {log} --json {flags}"));
     let json: Value = serde_json::from_str(&ran.out).unwrap();
     let word = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let findings = json["findings"].as_array().unwrap().iter();
@@ -342,4 +346,53 @@ fn a_meaning_that_is_certain_is_the_only_cause_that_is_named() {
     gyro_alone(dir.path(), 0.8, 1.0);
     let cure = ["sample-kind", "error", "--sample-kind rate"];
     assert_eq!(wrong(dir.path(), "--sample-kind delta-angle"), [cure]);
+}
+
+/// Codes of a minute in the hand, spoilt, and the first advice of the first.
+fn of_spoilt(samples: &[ImuSample]) -> (Vec<&'static str>, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let found = found(&written(dir.path(), "log.mcap", samples));
+    let help = found.first().map(flags).unwrap_or_default();
+    (codes(&found), help)
+}
+
+#[test]
+fn an_orientation_of_another_clock_is_told_with_its_shift_and_blamed_for_nothing_else() {
+    let sound = moved(3, |_, _| ());
+    assert_eq!(of_spoilt(&sound).0, Vec::<&str>::new());
+    for late in [-40_isize, 25, 120] {
+        let last = sound.len() - 1;
+        let mut shifted = sound.clone();
+        for (i, sample) in shifted.iter_mut().enumerate() {
+            let then = i.saturating_add_signed(-late).min(last);
+            sample.orientation = sound[then].orientation;
+        }
+        assert_eq!(of_spoilt(&shifted).0, ["orientation-shifted"], "{late}");
+    }
+}
+
+#[test]
+fn a_clock_at_half_speed_is_a_factor_between_gyro_and_orientation() {
+    let mut slow = moved(4, |sample, _| sample.accel = [0.0; 3]);
+    slow.iter_mut()
+        .for_each(|sample| sample.stamp = START + (sample.stamp - START) / 2);
+    let (codes, help) = of_spoilt(&slow);
+    assert!(codes.contains(&"gyro-scale"), "{codes:?}");
+    assert!(help.starts_with("--gyro-scale 2"), "{help}");
+}
+
+#[test]
+fn an_accelerometer_that_two_others_contradict_is_the_one_that_is_wrong() {
+    let mirrored = moved(5, |sample, _| sample.accel[0] *= -1.0);
+    let (codes, help) = of_spoilt(&mirrored);
+    assert_eq!(codes, ["accel-axes"]);
+    assert!(help.contains("--accel-axes xYZ"), "{help}");
+    // No map of the gyro shows a sign of all axes, and gravity stands as still.
+    let reversed = moved(5, |sample, _| sample.accel = sample.accel.map(|a| -a));
+    let dir = tempfile::tempdir().unwrap();
+    written(dir.path(), "log.mcap", &reversed);
+    let of = |flags: &str| wrong_in(dir.path(), "log.mcap", &format!("--aid gravity {flags}"));
+    let cure = ["orientation-leans", "warning", "--accel-axes xyz"];
+    assert_eq!(of(""), [cure]);
+    assert_eq!(of(cure[2]), Vec::<[String; 3]>::new());
 }

@@ -18,11 +18,23 @@ const FEWEST: usize = 30;
 const AGREEING: f64 = 0.6;
 const NEAR: f64 = 0.2;
 
+/// Ratio of the turns of an estimate to those of a reference.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TurnRatio {
+    /// Median.
+    pub ratio: f64,
+    /// Median distance from it, as a share.
+    pub spread: f64,
+}
+
 /// Ratio of the turns of `estimate` to those of the reference over a tenth of a second: the median where most agree,
 /// and `None` where they do not, or too few turn. What is up to two rad in one step is told; noise of the reference below
 /// some mrad moves it by a few percent.
 #[must_use]
-pub fn turn_ratio<'r>(estimate: &[Stamped], reference: impl Into<Reference<'r>>) -> Option<f64> {
+pub fn turn_ratio<'r>(
+    estimate: &[Stamped],
+    reference: impl Into<Reference<'r>>,
+) -> Option<TurnRatio> {
     let reference: Reference<'_> = reference.into();
     let (estimate, referred) = (Track::new(estimate), Track::new(reference.rows));
     let mut turns = Vec::new();
@@ -40,10 +52,11 @@ pub fn turn_ratio<'r>(estimate: &[Stamped], reference: impl Into<Reference<'r>>)
         .filter(|ratio| ratio.is_finite() && *ratio > 0.0)
         .collect();
     let ratio = quantile(&mut ratios, 0.5)?;
-    let is_near = |other: &&f64| (**other / ratio - 1.0).abs() < NEAR;
-    let agreeing = ratios.iter().filter(is_near).count();
-    let is_told = ratios.len() >= FEWEST && agreeing as f64 >= AGREEING * ratios.len() as f64;
-    is_told.then_some(ratio)
+    let mut off: Vec<f64> = ratios.iter().map(|r| (r / ratio - 1.0).abs()).collect();
+    let agreeing = off.iter().filter(|off| **off < NEAR).count();
+    let is_told = off.len() >= FEWEST && agreeing as f64 >= AGREEING * off.len() as f64;
+    let spread = quantile(&mut off, 0.5)?;
+    is_told.then_some(TurnRatio { ratio, spread })
 }
 
 /// Visits the angles by which `estimate` and the reference turned, rad, over each tenth of a second that both know.
@@ -113,7 +126,10 @@ mod tests {
         let reference = track(1.0, 2e-3);
         for times in [1.0, 0.5, 2.0, 57.3, 1.0 / 57.3, 1e-3] {
             let found = turn_ratio(&track(times, 0.0), &reference).unwrap();
-            assert!((found / times - 1.0).abs() < 0.05, "{times}: {found}");
+            assert!(
+                (found.ratio / times - 1.0).abs() < 0.05,
+                "{times}: {found:?}"
+            );
         }
     }
 

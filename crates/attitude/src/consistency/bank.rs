@@ -308,6 +308,7 @@ impl Evidence {
         self.rows.iter().map(|row| (row.span.0, row.span.1, row))
     }
 }
+
 /// Evidence of a segment for a map under which gravity scatters by `found` against one under which it does by `other`.
 pub(super) fn evidence(other: f64, found: f64) -> f64 {
     (other / found).ln().clamp(-CLIP, CLIP)

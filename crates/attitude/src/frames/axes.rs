@@ -97,6 +97,19 @@ impl AxisMap {
         }))
     }
 
+    /// The map that undoes this one.
+    #[must_use]
+    pub fn inverse(self) -> AxisMap {
+        // The transpose of a signed permutation is one.
+        AxisMap::from_matrix(&self.matrix().transpose()).unwrap_or(self)
+    }
+
+    /// The map whose axes all point the other way.
+    #[must_use]
+    pub fn reversed(self) -> AxisMap {
+        AxisMap(self.0.map(Take::negated))
+    }
+
     /// Whether it turns right-handed axes into left-handed ones.
     #[must_use]
     pub fn mirrors(self) -> bool {

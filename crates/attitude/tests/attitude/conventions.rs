@@ -209,6 +209,9 @@ fn of_the_48_axis_maps_24_are_rotations_and_24_are_refused_as_mirrors() {
                 })
                 .collect();
             let map: AxisMap = text.parse().unwrap();
+            assert_eq!(map.inverse().after(map), AxisMap::IDENTITY, "{text}");
+            let back = map.reversed().apply([1.0, 2.0, 3.0]).map(|v| -v);
+            assert_eq!(back, map.apply([1.0, 2.0, 3.0]), "{text}");
             assert_eq!(map.to_string(), text);
             let v = [1.0, 2.0, 3.0];
             match map.to_dcm::<Body, Sensor>() {

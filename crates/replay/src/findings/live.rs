@@ -250,7 +250,7 @@ impl SensorWatch {
         let resolved = &self.looked.resolved;
         let first = estimator.conditioning().first;
         let changed = gyro.and_then(|gyro| stream::axes_changed(gyro, plan, first, true));
-        let disagrees = || sensors::disagreement((gyro?, plan, resolved));
+        let disagrees = || sensors::disagreement((gyro?, plan, resolved), false);
         now.extend(changed.or_else(disagrees));
         now.extend(gyro.and_then(|gyro| stream::gravity_leap(gyro, first, true)));
         let is_sound = gyro.is_none_or(Consistency::agrees);

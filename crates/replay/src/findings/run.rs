@@ -151,7 +151,8 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
         stream::axes_changed(gyro, plan, noted.conditioning.first, false)
     });
     let disagrees = || {
-        let found = noted.gyro.and_then(sensors::disagreement)?;
+        let is_followed = orientation::follows(summary);
+        let found = sensors::disagreement(noted.gyro?, is_followed)?;
         // The motion's own accelerations may look like a scale: an orientation that turns as far is a second witness.
         let is_refuted = found.code == sensors::SCALE && orientation::agrees_in_scale(summary);
         (!is_refuted).then_some(found)
@@ -165,7 +166,8 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             .gyro
             .and_then(|(gyro, ..)| stream::bias_changed(gyro, noted.conditioning.first))
     };
-    let by_orientation = || orientation::other_unit(summary);
+    let by_orientation =
+        || orientation::other_unit(summary).or_else(|| orientation::other_scale(summary));
     let of_gyro = changed
         .or_else(bias)
         .or_else(disagrees)

@@ -3,7 +3,7 @@
 //! Apart from the rules about samples because it needs the samples integrated; what is measured is in
 //! `strapd_attitude::consistency`. A cure is advised where the recording, integrated with it, agrees.
 
-use super::orientation::MEANING;
+use super::orientation::{BEYOND_SIGMA, MEANING};
 use super::samples::COUNTS;
 use super::{Finding, Severity, axes};
 use crate::finding::{GYRO_DEAD, GYRO_EULER_RATES};
@@ -13,12 +13,13 @@ use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::consistency::{CHIPS, Cause, Consistency, Disagreement};
 use strapd_attitude::estimate::{EstimationSettings, Meaning, SensorCalibration};
 use strapd_attitude::frames::AxisMap;
-use strapd_attitude::setting::{Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
+use strapd_attitude::setting::{ACCEL_AXES, Choice, GYRO_AXES, GYRO_SCALE, GYRO_UNIT};
 
 /// Codes of the findings here that name a cause.
 pub(super) const AXES: &str = "gyro-axes";
 pub(super) const SCALE: &str = "gyro-scale";
 const TURNED: &str = "gyro-turned";
+const ACCELEROMETER: &str = "accel-axes";
 /// Findings that have only a guess where a cause is named.
 const GUESSES: [&str; 3] = ["unit-against-gravity", "unit-degrees", "unit-unknown"];
 /// Findings that rates in a wrong unit bring with them.
@@ -45,12 +46,19 @@ struct Named {
     cure: Choice,
 }
 
-/// Finding that gyro and accelerometer speak of different bodies.
+/// Finding that gyro and accelerometer speak of different bodies; `is_followed` where a recorded orientation rotates as
+/// the gyro does.
 pub(super) fn disagreement(
     (consistency, plan, resolved): (&Consistency, &EstimationSettings, &Meaning),
+    is_followed: bool,
 ) -> Option<Finding> {
     let found = consistency.disagreement()?;
     let finding = match found.cause {
+        Cause::Axes {
+            map,
+            decided: [true, true, true],
+            scale: None,
+        } if is_followed => of_accelerometer(&found, map, plan),
         Cause::Axes {
             map,
             decided,
@@ -124,12 +132,30 @@ fn of_axes(
     if near.is_empty() {
         let times = format!(", times {}", significant(factor, 3));
         let all = finding(&times).with("factor", factor);
-        return all.help([axes, scaled(plan, factor)]);
+        return all.help([axes, scaled(plan.gyro_scale, factor)]);
     }
     let words: Vec<&str> = near.iter().map(|named| named.words.as_str()).collect();
     let all = finding(&format!("; {}", words.join(", or "))).with("factor", factor);
     near.into_iter()
         .fold(all, |all, named| all.help([axes.clone(), named.cure]))
+}
+
+/// Finding that the accelerometer's axes are others, where gyro and recorded orientation agree: `map` would cure the gyro.
+/// Gravity stands still under both directions of all its axes.
+fn of_accelerometer(found: &Disagreement, map: AxisMap, plan: &EstimationSettings) -> Finding {
+    let either = [map.inverse(), map.inverse().reversed()];
+    let [one, other] = either.map(|map| map.after(plan.accel_axes));
+    Finding::new(
+        Severity::Error,
+        ACCELEROMETER,
+        format!(
+            "the accelerometer disagrees with gyro and recorded orientation, which agree: its axes are {one} or {other}"
+        ),
+    )
+    .with("scatter_cured_g", found.cured)
+    .advise(tried(found.recorded, found.cured, "its axes mapped"))
+    .help([ACCEL_AXES.to(one)])
+    .help([ACCEL_AXES.to(other)])
 }
 
 /// Finding that single axes of the gyro have a scale of their own.
@@ -280,7 +306,7 @@ fn of_scale(
         };
     }
     if near.is_empty() {
-        let scaled = scaled(plan, factor);
+        let scaled = scaled(plan.gyro_scale, factor);
         return finding("")
             .with("scatter_cured_g", found.cured)
             .advise(tried(found.recorded, found.cured, "the rates scaled"))
@@ -312,6 +338,23 @@ fn near(
 /// Unit of the rates, in words.
 fn like(unit: GyroUnit) -> String {
     format!("they look like {}/s", unit.name())
+}
+
+/// Finding that the gyro, scaled by `own`, turns by so many times what a recorded orientation does.
+pub(super) fn of_ratio(ratio: f64, own: [f64; 3]) -> Finding {
+    let factor = ratio.recip();
+    Finding::new(
+        Severity::Error,
+        SCALE,
+        format!(
+            "gyro and recorded orientation disagree: true rates are {} of the recorded, or the samples' clock runs at {} of its speed",
+            significant(factor, 3),
+            significant(ratio, 3)
+        ),
+    )
+    .with("factor", factor)
+    .advise("the two rotate by that factor at all speeds")
+    .help([scaled(own, factor)])
 }
 
 /// Finding that the gyro turns as far as a recorded orientation does in this unit, and not in the one `taken`.
@@ -347,22 +390,22 @@ fn named(plan: &EstimationSettings, taken: GyroUnit) -> Vec<Named> {
         all.push(Named {
             factor,
             words: format!("counts of a range of {range} deg/s"),
-            cure: scaled(plan, factor),
+            cure: scaled(plan.gyro_scale, factor),
         });
     }
     for (factor, words) in [(2.0, "half"), (0.5, "twice")] {
         all.push(Named {
             factor,
             words: format!("read with {words} of its range"),
-            cure: scaled(plan, factor),
+            cure: scaled(plan.gyro_scale, factor),
         });
     }
     all
 }
 
-/// Scale that is so many times that of the plan.
-fn scaled(plan: &EstimationSettings, factor: f64) -> Choice {
-    let factors = plan.gyro_scale.map(|own| significant(own * factor, 4));
+/// Scale that is so many times `own`, the plan's.
+fn scaled(own: [f64; 3], factor: f64) -> Choice {
+    let factors = own.map(|own| significant(own * factor, 4));
     let [x, y, z] = &factors;
     GYRO_SCALE.to(match x == y && y == z {
         true => x.clone(),
@@ -388,6 +431,9 @@ pub(super) fn is_guess(code: &str) -> bool {
 pub(super) fn settle(found: &mut Vec<Finding>) {
     if found.iter().any(|f| f.code == axes::DEAD) {
         found.retain(|f| f.code != axes::SILENT);
+    }
+    if found.iter().any(|f| f.code == ACCELEROMETER) {
+        found.retain(|f| f.code != BEYOND_SIGMA);
     }
     let is_meaning = |f: &Finding| f.code == MEANING && f.severity == Severity::Error;
     if found.iter().any(is_meaning) {

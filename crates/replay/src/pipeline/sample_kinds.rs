@@ -10,13 +10,14 @@ use crate::summary::{Against, Recorded};
 use std::collections::HashMap;
 use strapd_attitude::compare::{
     Align, Consistency, Reference, Stamped, UncertainAttitude, compare, consistency, fit_body_axes,
-    fit_constant_bias, for_each_error, turn_ratio,
+    fit_constant_bias, fit_time_shift, for_each_error, turn_ratio,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{
     EstimationSettings, Initial, KindChoice, KindReason, Meaning, Prepared,
 };
+use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, GyroUnit, Nanos, RawSample, SampleKind, Status};
@@ -62,8 +63,10 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
 #[derive(Debug)]
 pub(super) struct AgainstRecorded {
     resolved: Meaning,
-    /// Whether the user scaled the rates: their unit is no question then.
-    is_scaled: bool,
+    /// Scale of the rates that was asked for: where there is one, their unit is no question.
+    gyro_scale: [f64; 3],
+    /// Map of the accelerometer's axes that was asked for.
+    accel_axes: AxisMap,
     clock: strapd_attitude::condition::Clock,
     own_reference: bool,
     estimators: Vec<Estimator>,
@@ -175,7 +178,8 @@ impl AgainstRecorded {
             .collect::<Result<Vec<_>, _>>()?;
         Ok(AgainstRecorded {
             resolved: resolved.clone(),
-            is_scaled: plan.gyro_scale != [1.0; 3],
+            gyro_scale: plan.gyro_scale,
+            accel_axes: plan.accel_axes,
             clock: prepared.clock,
             own_reference: true,
             tracks: estimators.iter().map(|_| Thinned::new()).collect(),
@@ -371,8 +375,13 @@ impl AgainstRecorded {
             unusable: self.unusable,
             constant: entries.len() > 1
                 && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
+            gyro_scale: self.gyro_scale,
+            accel_axes: self.accel_axes,
             turn_ratio,
-            unit: turn_ratio.and_then(|ratio| self.other_unit(ratio)),
+            shift: self
+                .used()
+                .and_then(|track| fit_time_shift(&track.entries, self.referred())),
+            unit: turn_ratio.and_then(|found| self.other_unit(found.ratio)),
             axes: best,
             consistency: consistency(&self.own.entries, self.referred(), self.align, |_| {}),
             bias: self
@@ -385,7 +394,7 @@ impl AgainstRecorded {
 
     /// Unit by which the rates turn as far as the recorded orientation, and the one they were taken in.
     fn other_unit(&self, ratio: f64) -> Option<[GyroUnit; 2]> {
-        if self.is_scaled {
+        if self.gyro_scale != [1.0; 3] {
             return None;
         }
         let taken = self.resolved.unit;

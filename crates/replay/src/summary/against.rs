@@ -4,7 +4,10 @@
 
 use super::significant;
 use serde_json::{Value, json};
-use strapd_attitude::compare::{Align, BiasFit, BodyAxesFit, Consistency, WithinSigma};
+use strapd_attitude::compare::{
+    Align, BiasFit, BodyAxesFit, Consistency, TimeShift, TurnRatio, WithinSigma,
+};
+use strapd_attitude::frames::AxisMap;
 use strapd_attitude::record::GyroUnit;
 use strapd_attitude::setting::{BIAS, Choice};
 
@@ -32,8 +35,14 @@ pub struct Recorded {
     pub unusable: u64,
     /// All of them are one and the same.
     pub constant: bool,
+    /// Scale of the recorded rates that was asked for.
+    pub gyro_scale: [f64; 3],
+    /// Map of the accelerometer's axes that was asked for.
+    pub accel_axes: AxisMap,
     /// Turn of the gyro by that of the orientation; `None` where too few turn, or they do not agree.
-    pub turn_ratio: Option<f64>,
+    pub turn_ratio: Option<TurnRatio>,
+    /// Shift of its clock against that of the samples, where one explains most of the error over a second.
+    pub shift: Option<TimeShift>,
     /// Unit by which the rates turn as far as it does, and the one they were taken in; `None` where that one, or none,
     /// does.
     pub unit: Option<[GyroUnit; 2]>,
@@ -47,6 +56,20 @@ pub struct Recorded {
     pub removed: [f64; 3],
     /// Resets by its source: errors are those of the parts between, each aligned by itself.
     pub resets: usize,
+}
+
+/// Shift of the clock of `what`, in words.
+#[must_use]
+pub fn shift_words(shift: &TimeShift, what: &str) -> String {
+    let [before, after] = shift.over_1s.map(deg);
+    let side = match shift.late_secs < 0.0 {
+        true => "early",
+        false => "late",
+    };
+    format!(
+        "{what} is {} s {side}: with that taken off, the error over 1 s is {after} deg instead of {before}",
+        significant(shift.late_secs.abs(), 2)
+    )
 }
 
 /// A share in percent: never 100 where one is outside.
