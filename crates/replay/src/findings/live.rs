@@ -3,6 +3,7 @@
 //! Apart from the rules because a stream has no end at which it could be judged: the watch goes along with it in bounded
 //! memory, and what was once certain is certain from then on.
 
+use super::orientation::Witness;
 use super::samples::{self, Seen};
 use super::{Finding, Severity, axes, magnetometer, run, sensors, stream};
 use crate::field_watch::FieldWatch;
@@ -250,7 +251,7 @@ impl SensorWatch {
         let resolved = &self.looked.resolved;
         let first = estimator.conditioning().first;
         let changed = gyro.and_then(|gyro| stream::axes_changed(gyro, plan, first, true));
-        let disagrees = || sensors::disagreement((gyro?, plan, resolved), false);
+        let disagrees = || sensors::disagreement((gyro?, plan, resolved), Witness::default());
         now.extend(changed.or_else(disagrees));
         now.extend(gyro.and_then(|gyro| stream::gravity_leap(gyro, first, true)));
         let is_sound = gyro.is_none_or(Consistency::agrees);

@@ -1,38 +1,27 @@
 //! A recorded orientation, and what it says about the samples -> findings. Pure.
 
-use super::{Finding, Severity, sensors};
+mod causes;
+
+pub(super) use causes::{Witness, other_scale, other_unit, witness};
+
+use super::{Finding, Severity};
 use crate::inspection::CheckedTopic;
 use crate::summary::against::{
     axes_json, axes_words, beyond_sigma, bias_json, bias_words, consistency_json, removing, resets,
-    shift_words,
 };
 use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
 use serde_json::json;
-use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency, TimeShift};
+use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 use strapd_attitude::estimate::KindReason;
-use strapd_attitude::frames::AxisMap;
 use strapd_attitude::record::SampleKind;
-use strapd_attitude::setting::{
-    ACCEL_AXES, AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND, TIME,
-};
+use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND, TIME};
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
-/// A meaning explains what a unit might when its median error is below this share of the other's.
-const FOLLOWS: f64 = 0.5;
 /// A meaning is certain when its median error over 1 s is below this share of the other's, which is above so many degrees.
 const CERTAINLY: f64 = 0.2;
 const LOST: f64 = 5.0;
-/// Share by which the gyro may turn farther than an orientation that its scale agrees with.
-const SAME_SCALE: f64 = 0.1;
-/// Error over a second, as a share of the rotation, of an orientation that follows the gyro.
-const FOLLOWED: f64 = 0.2;
-/// Angles between two verticals, rad, that are worth a word, and beyond which one is upside down: 20 and 150 degrees.
-const LEANS: f64 = 20.0 * std::f64::consts::PI / 180.0;
-const UPSIDE_DOWN: f64 = 150.0 * std::f64::consts::PI / 180.0;
-/// Median distance from a ratio of turns that is one factor, as a share.
-const ONE_FACTOR: f64 = 0.05;
 /// A bias explains an error when it leaves less than this share of it.
 const EXPLAINED: f64 = 0.4;
 /// Turns over 1 s above this are a motion, rad (2 degrees).
@@ -94,7 +83,7 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         return;
     }
     if let Some(shift) = &recorded.shift {
-        out.push(shifted(shift));
+        out.push(causes::shifted(shift));
         out.extend(meaning_unknown(summary));
         return;
     }
@@ -134,7 +123,7 @@ pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
         return found;
     }
     if let Some(shift) = summary.recorded.and_then(|recorded| recorded.shift) {
-        return vec![shifted(&shift)];
+        return vec![causes::shifted(&shift)];
     }
     if let Some(best) = best_meaning(&summary.against) {
         meaning(&summary.against, best, summary.kind.name(), &mut found);
@@ -158,70 +147,6 @@ fn is_certain(best: &Against, used: &Against) -> bool {
 fn used(summary: &TopicSummary) -> Option<&Against> {
     let mut rows = summary.against.iter();
     rows.find(|row| row.kind == summary.kind.name())
-}
-
-/// Whether the orientation turns as far as the gyro does, to a tenth: its rates are of no other scale.
-pub(super) fn agrees_in_scale(summary: &TopicSummary) -> bool {
-    let found = summary.recorded.and_then(|recorded| recorded.turn_ratio);
-    found.is_some_and(|found| (found.ratio - 1.0).abs() < SAME_SCALE)
-}
-
-/// Whether the orientation rotates as the gyro does, about the same axes.
-pub(super) fn follows(summary: &TopicSummary) -> bool {
-    let axes = summary.recorded.and_then(|recorded| recorded.axes);
-    axes.is_some_and(|fit| fit.as_recorded < FOLLOWED * fit.median_turn)
-}
-
-/// Finding that gravity is elsewhere in the world of the orientation.
-fn leaning(lean: f64, accel_axes: AxisMap) -> Finding {
-    let angle = significant(lean.to_degrees(), 2);
-    let what =
-        format!("the vertical of the recorded orientation leans by {angle} deg against gravity's");
-    let finding = Finding::new(Severity::Warning, "orientation-leans", what)
-        .with("lean_deg", lean.to_degrees());
-    match lean > UPSIDE_DOWN {
-        true => finding
-            .advise("its world has z down, or the accelerometer reads -1 g upwards: a sign turns all its axes")
-            .help([ACCEL_AXES.to(accel_axes.reversed())]),
-        false => finding.advise("its world is not level, or an axis of the accelerometer is wrong"),
-    }
-}
-
-/// Finding that the orientation shows each motion at another time.
-fn shifted(shift: &TimeShift) -> Finding {
-    let what = shift_words(shift, "the recorded orientation");
-    Finding::new(Severity::Warning, SHIFTED, what)
-        .with("late_s", shift.late_secs)
-        .with("over_1s_deg", shift.over_1s.map(f64::to_degrees).to_vec())
-        .advise("its clock is another, or a filter delays it: nothing else is concluded from it")
-}
-
-/// Finding that the orientation turns farther or less far than the gyro by one factor, which is no unit's and which no
-/// meaning of a sample explains.
-pub(super) fn other_scale(summary: &TopicSummary) -> Option<Finding> {
-    let recorded = summary.recorded?;
-    let found = recorded.turn_ratio?;
-    let is_one = recorded.unit.is_none() && found.spread < ONE_FACTOR;
-    let is_other = is_one && !agrees_in_scale(summary) && !is_of_meaning(summary)?;
-    is_other.then(|| sensors::of_ratio(found.ratio, recorded.gyro_scale))
-}
-
-/// Whether the orientation follows the gyro better by another meaning of a sample.
-fn is_of_meaning(summary: &TopicSummary) -> Option<bool> {
-    let best = best_meaning(&summary.against)?;
-    Some(best.median_deg < FOLLOWS * used(summary)?.median_deg)
-}
-
-/// Finding that the rates are of another unit, where a recorded orientation shows it and no meaning of a sample would.
-pub(super) fn other_unit(summary: &TopicSummary) -> Option<Finding> {
-    let [unit, taken] = summary.recorded?.unit?;
-    let used = summary
-        .against
-        .iter()
-        .find(|r| r.kind == summary.kind.name())?;
-    let best = best_meaning(&summary.against)?;
-    let is_of_meaning = best.median_deg < FOLLOWS * used.median_deg;
-    (!is_of_meaning).then(|| sensors::of_unit(unit, taken))
 }
 
 /// A bias by which the gyro leaves it, and a sigma that does not hold. `at_rest` is the bias that a rest shows.
@@ -262,8 +187,8 @@ fn told_by_it(
     let Some(found) = &recorded.consistency else {
         return;
     };
-    if let Some(lean) = found.leaning.filter(|lean| *lean > LEANS) {
-        out.push(leaning(lean, recorded.accel_axes));
+    if let Some(lean) = found.leaning.filter(|lean| *lean > causes::LEANS) {
+        out.push(causes::leaning(lean, recorded.accel_axes));
     }
     let Some(what) = beyond_sigma(found) else {
         heading_drift(found, help, out);

@@ -150,13 +150,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     let changed = noted.gyro.and_then(|(gyro, plan, _)| {
         stream::axes_changed(gyro, plan, noted.conditioning.first, false)
     });
-    let disagrees = || {
-        let is_followed = orientation::follows(summary);
-        let found = sensors::disagreement(noted.gyro?, is_followed)?;
-        // The motion's own accelerations may look like a scale: an orientation that turns as far is a second witness.
-        let is_refuted = found.code == sensors::SCALE && orientation::agrees_in_scale(summary);
-        (!is_refuted).then_some(found)
-    };
+    let disagrees = || sensors::disagreement(noted.gyro?, orientation::witness(summary));
     let leap = noted
         .gyro
         .and_then(|(gyro, ..)| stream::gravity_leap(gyro, noted.conditioning.first, false));

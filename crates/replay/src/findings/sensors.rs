@@ -3,7 +3,7 @@
 //! Apart from the rules about samples because it needs the samples integrated; what is measured is in
 //! `strapd_attitude::consistency`. A cure is advised where the recording, integrated with it, agrees.
 
-use super::orientation::{BEYOND_SIGMA, MEANING};
+use super::orientation::{BEYOND_SIGMA, MEANING, Witness};
 use super::samples::COUNTS;
 use super::{Finding, Severity, axes};
 use crate::finding::{GYRO_DEAD, GYRO_EULER_RATES};
@@ -17,7 +17,7 @@ use strapd_attitude::setting::{ACCEL_AXES, Choice, GYRO_AXES, GYRO_SCALE, GYRO_U
 
 /// Codes of the findings here that name a cause.
 pub(super) const AXES: &str = "gyro-axes";
-pub(super) const SCALE: &str = "gyro-scale";
+const SCALE: &str = "gyro-scale";
 const TURNED: &str = "gyro-turned";
 const ACCELEROMETER: &str = "accel-axes";
 /// Findings that have only a guess where a cause is named.
@@ -46,11 +46,10 @@ struct Named {
     cure: Choice,
 }
 
-/// Finding that gyro and accelerometer speak of different bodies; `is_followed` where a recorded orientation rotates as
-/// the gyro does.
+/// Finding that gyro and accelerometer speak of different bodies, with what a recorded orientation says of the gyro.
 pub(super) fn disagreement(
     (consistency, plan, resolved): (&Consistency, &EstimationSettings, &Meaning),
-    is_followed: bool,
+    witness: Witness,
 ) -> Option<Finding> {
     let found = consistency.disagreement()?;
     let finding = match found.cause {
@@ -58,7 +57,7 @@ pub(super) fn disagreement(
             map,
             decided: [true, true, true],
             scale: None,
-        } if is_followed => of_accelerometer(&found, map, plan),
+        } if witness.follows => of_accelerometer(&found, map, plan),
         Cause::Axes {
             map,
             decided,
@@ -70,6 +69,8 @@ pub(super) fn disagreement(
         ),
         Cause::Scales { factors, sigma } => of_scales(&found, (factors, sigma), plan),
         Cause::Turned { by, angle, sigma } => of_turn(&found, (&by, angle, sigma), plan),
+        // The motion's own accelerations look like a scale, too.
+        Cause::Scale { .. } if witness.agrees_in_scale => return None,
         Cause::Scale { factor, sigma } => of_scale(
             (&found, consistency),
             (factor, sigma),

@@ -3,6 +3,9 @@
 //! What a sample means in time matters more than the order of the integrator and is written in no
 //! log; where an orientation was recorded too, it can be seen.
 
+mod thinned;
+
+use self::thinned::{MOST, Thinned};
 use super::attitude_track::{Track, cut};
 use crate::summary::series::{ErrorTrace, Errors};
 use crate::summary::trace::Traces;
@@ -22,10 +25,6 @@ use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, GyroUnit, Nanos, RawSample, SampleKind, Status};
 use strapd_attitude::worlds::{Convention, World};
-
-/// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
-/// stays bounded on any log.
-const MOST: usize = 1 << 17;
 
 /// Comparisons at once for which there is that much room; more share it.
 const ROOMY: usize = 8;
@@ -87,43 +86,6 @@ pub(super) struct AgainstRecorded {
     received: Vec<Nanos>,
     moved: HashMap<Nanos, Nanos>,
     unusable: u64,
-}
-
-/// A track that halves itself when it grows too long.
-#[derive(Debug)]
-struct Thinned<T> {
-    entries: Vec<T>,
-    most: usize,
-    stride: u64,
-    seen: u64,
-}
-
-impl<T> Thinned<T> {
-    fn new() -> Thinned<T> {
-        Thinned {
-            entries: Vec::new(),
-            most: MOST,
-            stride: 1,
-            seen: 0,
-        }
-    }
-
-    fn push(&mut self, entry: T) {
-        if self.seen.is_multiple_of(self.stride) {
-            if self.entries.len() >= self.most {
-                let mut keep = false;
-                self.entries.retain(|_| {
-                    keep = !keep;
-                    keep
-                });
-                self.stride *= 2;
-            }
-            if self.seen.is_multiple_of(self.stride) {
-                self.entries.push(entry);
-            }
-        }
-        self.seen += 1;
-    }
 }
 
 /// The kinds samples are taken for.
