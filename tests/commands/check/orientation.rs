@@ -3,6 +3,7 @@
 use super::{codes, flags, found};
 use crate::made_logs::{ImuSample, START, written};
 use crate::program::strapd;
+use crate::replays::fixture;
 use serde_json::Value;
 use std::path::Path;
 use strapd_attitude::frames::{Body, Nav};
@@ -318,6 +319,13 @@ fn an_orientation_tells_the_unit_of_a_gyro_without_an_accelerometer() {
         let mended = wrong(at, &format!("--gyro-unit {unit} --mend"));
         assert_eq!(mended, Vec::<[String; 3]>::new());
     }
+    // At 50 Hz an angle a sample is nearly a rate in degrees.
+    let xsens = wrong_in(
+        at,
+        fixture("xsens_mti.mcap").to_str().unwrap(),
+        "--gyro-unit deg",
+    );
+    assert_eq!(xsens, [cure]);
     // Degrees of a motion so slow that nobody doubts their size.
     gyro_alone(at, 0.05, 1_f64.to_degrees());
     let cure = ["gyro-scale", "error", "--gyro-unit deg, or --mend"];

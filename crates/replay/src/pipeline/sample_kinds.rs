@@ -7,6 +7,7 @@ mod thinned;
 
 use self::thinned::{MOST, Thinned};
 use super::attitude_track::{Track, cut};
+use crate::summary::against::OtherUnit;
 use crate::summary::series::{ErrorTrace, Errors};
 use crate::summary::trace::Traces;
 use crate::summary::{Against, Recorded};
@@ -354,17 +355,21 @@ impl AgainstRecorded {
         })
     }
 
-    /// Unit by which the rates turn as far as the recorded orientation, and the one they were taken in.
-    fn other_unit(&self, ratio: f64) -> Option<[GyroUnit; 2]> {
+    /// Unit by which the rates turn as far as the recorded orientation, where it is another.
+    fn other_unit(&self, ratio: f64) -> Option<OtherUnit> {
         if self.gyro_scale != [1.0; 3] {
             return None;
         }
         let taken = self.resolved.unit;
-        let off = |unit: &GyroUnit| (ratio * unit.to_rad() / taken.to_rad() - 1.0).abs();
+        let off = |unit: GyroUnit| (ratio * unit.to_rad() / taken.to_rad() - 1.0).abs();
         let unit = GyroUnit::ALL
             .into_iter()
-            .find(|unit| off(unit) < SAME_UNIT)?;
-        (unit != taken).then_some([unit, taken])
+            .find(|unit| off(*unit) < SAME_UNIT)?;
+        (unit != taken).then_some(OtherUnit {
+            unit,
+            taken,
+            off: off(unit),
+        })
     }
 
     /// The track of the meaning the run took.

@@ -26,6 +26,17 @@ pub struct Against {
     pub pairs: usize,
 }
 
+/// Unit of rates that were taken in another.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct OtherUnit {
+    /// Unit by which they turn as far as a reference.
+    pub unit: GyroUnit,
+    /// Unit in which they were taken.
+    pub taken: GyroUnit,
+    /// Share by which they are off in the first.
+    pub off: f64,
+}
+
 /// A recorded orientation that was compared with.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Recorded {
@@ -43,9 +54,8 @@ pub struct Recorded {
     pub turn_ratio: Option<TurnRatio>,
     /// Shift of its clock against that of the samples, where one explains most of the error over a second.
     pub shift: Option<TimeShift>,
-    /// Unit by which the rates turn as far as it does, and the one they were taken in; `None` where that one, or none,
-    /// does.
-    pub unit: Option<[GyroUnit; 2]>,
+    /// Unit by which the rates turn as far as it does; `None` where the one they were taken in, or none, does.
+    pub unit: Option<OtherUnit>,
     /// Axes of its body relative to the gyro's; `None` = the motion does not tell.
     pub axes: Option<BodyAxesFit>,
     /// Whether the run's errors lie within what it said of them; `None` = no instant in common, or no sigma.

@@ -5,7 +5,7 @@
 
 use super::{SHIFTED, best_meaning, used};
 use crate::findings::{Finding, Severity, sensors};
-use crate::summary::against::shift_words;
+use crate::summary::against::{OtherUnit, shift_words};
 use crate::summary::{TopicSummary, significant};
 use strapd_attitude::compare::{BodyAxesFit, TimeShift, TurnRatio};
 use strapd_attitude::frames::AxisMap;
@@ -13,6 +13,8 @@ use strapd_attitude::setting::ACCEL_AXES;
 
 /// A meaning explains what a unit might when its median error is below this share of the other's.
 const FOLLOWS: f64 = 0.5;
+/// A unit explains better what a meaning would as well when it is off by less than this share of what that leaves.
+const CLOSER: f64 = 0.3;
 /// Share by which the gyro may turn farther than an orientation that its scale agrees with.
 const SAME_SCALE: f64 = 0.1;
 /// Error over a second, as a share of the rotation, of an orientation that follows the gyro.
@@ -85,8 +87,16 @@ fn is_of_meaning(summary: &TopicSummary) -> Option<bool> {
     Some(best.median_deg < FOLLOWS * used(summary)?.median_deg)
 }
 
-/// Finding that the rates are of another unit, where a recorded orientation shows it and no meaning of a sample would.
+/// Finding that the rates are of another unit, where a recorded orientation shows it and no meaning of a sample would as
+/// well: at 57 Hz an angle a sample is about a rate in degrees.
 pub(in crate::findings) fn other_unit(summary: &TopicSummary) -> Option<Finding> {
-    let [unit, taken] = summary.recorded?.unit?;
-    (!is_of_meaning(summary)?).then(|| sensors::of_unit(unit, taken))
+    let recorded = summary.recorded?;
+    let OtherUnit { unit, taken, off } = recorded.unit?;
+    let is_closer = || {
+        let best = best_meaning(&summary.against)?;
+        let left = best.median_deg.to_radians() / recorded.bias?.turn;
+        Some(off < CLOSER * left)
+    };
+    let is_told = !is_of_meaning(summary)? || is_closer() == Some(true);
+    is_told.then(|| sensors::of_unit(unit, taken))
 }
