@@ -69,7 +69,13 @@ impl Consistency {
     /// Whether less than 98 % of the errors of tilt or heading lie within three sigma.
     #[must_use]
     pub fn is_beyond(&self) -> bool {
-        self.tilt.inside.min(self.heading.inside) < ENOUGH_INSIDE
+        self.is_beyond_in_tilt() || self.heading.inside < ENOUGH_INSIDE
+    }
+
+    /// Whether less than 98 % of the errors of tilt lie within three sigma.
+    #[must_use]
+    pub fn is_beyond_in_tilt(&self) -> bool {
+        self.tilt.inside < ENOUGH_INSIDE
     }
 }
 

@@ -53,6 +53,8 @@ pub(super) fn disagreement(
 ) -> Option<Finding> {
     let found = consistency.disagreement()?;
     let finding = match found.cause {
+        // The motion's own accelerations look like other axes, too: wrong ones would show in the tilt.
+        Cause::Axes { .. } if witness.follows && witness.agrees_in_tilt => return None,
         Cause::Axes {
             map,
             decided: [true, true, true],
@@ -69,7 +71,7 @@ pub(super) fn disagreement(
         ),
         Cause::Scales { factors, sigma } => of_scales(&found, (factors, sigma), plan),
         Cause::Turned { by, angle, sigma } => of_turn(&found, (&by, angle, sigma), plan),
-        // The motion's own accelerations look like a scale, too.
+        // And like a scale.
         Cause::Scale { .. } if witness.agrees_in_scale => return None,
         Cause::Scale { factor, sigma } => of_scale(
             (&found, consistency),

@@ -7,7 +7,7 @@ use super::{SHIFTED, best_meaning, used};
 use crate::findings::{Finding, Severity, sensors};
 use crate::summary::against::{OtherUnit, shift_words};
 use crate::summary::{TopicSummary, significant};
-use strapd_attitude::compare::{BodyAxesFit, TimeShift, TurnRatio};
+use strapd_attitude::compare::{BodyAxesFit, Consistency, TimeShift, TurnRatio};
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::setting::ACCEL_AXES;
 
@@ -17,7 +17,7 @@ const FOLLOWS: f64 = 0.5;
 const CLOSER: f64 = 0.3;
 /// Share by which the gyro may turn farther than an orientation that its scale agrees with.
 const SAME_SCALE: f64 = 0.1;
-/// Error over a second, as a share of the rotation, of an orientation that follows the gyro.
+/// Error over 19 of 20 seconds, as a share of the median rotation, of an orientation that follows the gyro.
 const FOLLOWED: f64 = 0.2;
 /// Angles between two verticals, rad, that are worth a word, and beyond which one is upside down: 20 and 150 degrees.
 pub(super) const LEANS: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -32,6 +32,8 @@ pub(in crate::findings) struct Witness {
     pub(in crate::findings) follows: bool,
     /// Whether it rotates as far, to a tenth.
     pub(in crate::findings) agrees_in_scale: bool,
+    /// Whether its vertical is the one that gyro and accelerometer find together.
+    pub(in crate::findings) agrees_in_tilt: bool,
 }
 
 /// Testimony of the orientation of a run about its gyro; none where there is no orientation.
@@ -39,11 +41,19 @@ pub(in crate::findings) fn witness(summary: &TopicSummary) -> Witness {
     let Some(recorded) = &summary.recorded else {
         return Witness::default();
     };
-    let is_followed = |fit: BodyAxesFit| fit.as_recorded < FOLLOWED * fit.median_turn;
+    // By nearly all seconds: of an axis that is seldom turned about, the median knows nothing.
+    let p95 = used(summary).map_or(f64::INFINITY, |used| used.p95_deg.to_radians());
+    let is_followed = |fit: BodyAxesFit| p95 < FOLLOWED * fit.median_turn;
+    let is_level = |found: Consistency| {
+        found.leaning.is_none_or(|lean| lean < LEANS)
+            && found.tilt.rms < 0.5 * LEANS
+            && !found.is_beyond_in_tilt()
+    };
     let is_as_far = |found: TurnRatio| (found.ratio - 1.0).abs() < SAME_SCALE;
     Witness {
         follows: recorded.axes.is_some_and(is_followed),
         agrees_in_scale: recorded.turn_ratio.is_some_and(is_as_far),
+        agrees_in_tilt: summary.aided.is_some() && recorded.consistency.is_some_and(is_level),
     }
 }
 
