@@ -376,6 +376,12 @@ fn an_orientation_of_another_clock_is_told_with_its_shift_and_blamed_for_nothing
             sample.orientation = sound[then].orientation;
         }
         assert_eq!(of_spoilt(&shifted).0, ["orientation-shifted"], "{late}");
+        let dir = tempfile::tempdir().unwrap();
+        written(dir.path(), "log.mcap", &shifted);
+        strapd(dir.path(), "replay log.mcap -o est.mcap").done();
+        let ran = strapd(dir.path(), "compare est.mcap log.mcap --json");
+        let found = ran.json()["late_s"].as_f64().unwrap();
+        assert!((found - late as f64 * 0.01).abs() < 5e-3, "{late}: {found}");
     }
 }
 

@@ -72,22 +72,10 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         let note = Finding::new(Severity::Note, "orientation-reset", what);
         out.push(note.with("resets", recorded.resets));
     }
-    if other_unit(summary).is_some() {
-        // What else it says of the samples follows from that.
-        return;
-    }
-    if let (Some(best), Some(used)) = (best_meaning(&summary.against), used(summary))
-        && is_certain(best, used)
-    {
-        meaning(&summary.against, best, summary.kind.name(), out);
-        return;
-    }
-    if let Some(shift) = &recorded.shift {
-        out.push(causes::shifted(shift));
-        out.extend(meaning_unknown(summary));
-        return;
-    }
-    if other_scale(summary).is_some() {
+    if let Some(found) = explained(summary, recorded) {
+        let is_shift = found.as_ref().is_some_and(|f| f.code == SHIFTED);
+        out.extend(found);
+        out.extend(meaning_unknown(summary).filter(|_| is_shift));
         return;
     }
     let trusted = is_truth(recorded, is_seen, out);
@@ -116,14 +104,11 @@ fn of_another_clock() -> Finding {
 /// Findings of a replay about the orientation it was compared with: nothing of its bias if that is no truth.
 pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
     let mut found = Vec::new();
-    if other_unit(summary)
-        .or_else(|| other_scale(summary))
-        .is_some()
+    if let Some(recorded) = &summary.recorded
+        && let Some(cause) = explained(summary, recorded)
     {
+        found.extend(cause);
         return found;
-    }
-    if let Some(shift) = summary.recorded.and_then(|recorded| recorded.shift) {
-        return vec![causes::shifted(&shift)];
     }
     if let Some(best) = best_meaning(&summary.against) {
         meaning(&summary.against, best, summary.kind.name(), &mut found);
@@ -136,6 +121,25 @@ pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
         told_by_it(summary, recorded, None, &mut found);
     }
     found
+}
+
+/// Finding of the one cause that explains what the orientation contradicts, so that nothing else is concluded from it;
+/// `Some(None)` where the run names it beside its other sensors.
+fn explained(summary: &TopicSummary, recorded: &Recorded) -> Option<Option<Finding>> {
+    if other_unit(summary).is_some() {
+        return Some(None);
+    }
+    if let (Some(best), Some(used)) = (best_meaning(&summary.against), used(summary))
+        && is_certain(best, used)
+    {
+        let mut found = Vec::new();
+        meaning(&summary.against, best, used.kind, &mut found);
+        return Some(found.pop());
+    }
+    if let Some(shift) = &recorded.shift {
+        return Some(Some(causes::shifted(shift)));
+    }
+    other_scale(summary).map(|_| None)
 }
 
 /// Whether the orientation follows the gyro by this meaning of a sample, and by the one used it does not at all.

@@ -7,7 +7,6 @@ mod thinned;
 
 use self::thinned::{MOST, Thinned};
 use super::attitude_track::{Track, cut};
-use crate::summary::against::OtherUnit;
 use crate::summary::series::{ErrorTrace, Errors};
 use crate::summary::trace::Traces;
 use crate::summary::{Against, Recorded};
@@ -24,7 +23,7 @@ use strapd_attitude::estimate::{
 use strapd_attitude::frames::AxisMap;
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{AttitudeSample, GyroUnit, Nanos, RawSample, SampleKind, Status};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status};
 use strapd_attitude::worlds::{Convention, World};
 
 /// Comparisons at once for which there is that much room; more share it.
@@ -32,9 +31,6 @@ const ROOMY: usize = 8;
 
 /// Attitudes kept while the samples have brought no orientation yet.
 const BEFORE: usize = 1024;
-
-/// Share by which a ratio of turns may be off that of two units.
-const SAME_UNIT: f64 = 0.15;
 
 /// The meanings tried: name, words, kind, and the method where it is not the run's own.
 const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
@@ -63,7 +59,7 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
 #[derive(Debug)]
 pub(super) struct AgainstRecorded {
     resolved: Meaning,
-    /// Scale of the rates that was asked for: where there is one, their unit is no question.
+    /// Scale of the rates that was asked for.
     gyro_scale: [f64; 3],
     /// Map of the accelerometer's axes that was asked for.
     accel_axes: AxisMap,
@@ -330,45 +326,23 @@ impl AgainstRecorded {
             .filter(|((_, _, kind, _), _)| is_angle(*kind) == is_angle(self.resolved.kind))
             .filter_map(|(_, track)| fit_body_axes(&track.entries, entries))
             .min_by(|a, b| a.turned.total_cmp(&b.turned));
-        let turn_ratio = self
-            .used()
-            .and_then(|track| turn_ratio(&track.entries, self.referred()));
+        let (used, referred) = (self.used(), self.referred());
+        let used = used.map(|track| track.entries.as_slice());
         Some(Recorded {
             usable: entries.len(),
             unusable: self.unusable,
             constant: entries.len() > 1
                 && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
+            gyro_unit: self.resolved.unit,
             gyro_scale: self.gyro_scale,
             accel_axes: self.accel_axes,
-            turn_ratio,
-            shift: self
-                .used()
-                .and_then(|track| fit_time_shift(&track.entries, self.referred())),
-            unit: turn_ratio.and_then(|found| self.other_unit(found.ratio)),
+            turn_ratio: used.and_then(|rows| turn_ratio(rows, referred)),
+            shift: used.and_then(|rows| fit_time_shift(rows, referred)),
             axes: best,
             consistency: consistency(&self.own.entries, self.referred(), self.align, |_| {}),
-            bias: self
-                .used()
-                .and_then(|track| fit_constant_bias(&track.entries, self.referred())),
+            bias: used.and_then(|rows| fit_constant_bias(rows, referred)),
             removed: self.removed,
             resets: self.cuts.len(),
-        })
-    }
-
-    /// Unit by which the rates turn as far as the recorded orientation, where it is another.
-    fn other_unit(&self, ratio: f64) -> Option<OtherUnit> {
-        if self.gyro_scale != [1.0; 3] {
-            return None;
-        }
-        let taken = self.resolved.unit;
-        let off = |unit: GyroUnit| (ratio * unit.to_rad() / taken.to_rad() - 1.0).abs();
-        let unit = GyroUnit::ALL
-            .into_iter()
-            .find(|unit| off(*unit) < SAME_UNIT)?;
-        (unit != taken).then_some(OtherUnit {
-            unit,
-            taken,
-            off: off(unit),
         })
     }
 

@@ -26,17 +26,6 @@ pub struct Against {
     pub pairs: usize,
 }
 
-/// Unit of rates that were taken in another.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct OtherUnit {
-    /// Unit by which they turn as far as a reference.
-    pub unit: GyroUnit,
-    /// Unit in which they were taken.
-    pub taken: GyroUnit,
-    /// Share by which they are off in the first.
-    pub off: f64,
-}
-
 /// A recorded orientation that was compared with.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Recorded {
@@ -46,6 +35,8 @@ pub struct Recorded {
     pub unusable: u64,
     /// All of them are one and the same.
     pub constant: bool,
+    /// Unit in which the rates were taken.
+    pub gyro_unit: GyroUnit,
     /// Scale of the recorded rates that was asked for.
     pub gyro_scale: [f64; 3],
     /// Map of the accelerometer's axes that was asked for.
@@ -54,8 +45,6 @@ pub struct Recorded {
     pub turn_ratio: Option<TurnRatio>,
     /// Shift of its clock against that of the samples, where one explains most of the error over a second.
     pub shift: Option<TimeShift>,
-    /// Unit by which the rates turn as far as it does; `None` where the one they were taken in, or none, does.
-    pub unit: Option<OtherUnit>,
     /// Axes of its body relative to the gyro's; `None` = the motion does not tell.
     pub axes: Option<BodyAxesFit>,
     /// Whether the run's errors lie within what it said of them; `None` = no instant in common, or no sigma.

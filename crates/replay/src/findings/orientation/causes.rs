@@ -5,14 +5,17 @@
 
 use super::{SHIFTED, best_meaning, used};
 use crate::findings::{Finding, Severity, sensors};
-use crate::summary::against::{OtherUnit, shift_words};
-use crate::summary::{TopicSummary, significant};
+use crate::summary::against::shift_words;
+use crate::summary::{Recorded, TopicSummary, significant};
 use strapd_attitude::compare::{BodyAxesFit, Consistency, TimeShift, TurnRatio};
 use strapd_attitude::frames::AxisMap;
+use strapd_attitude::record::GyroUnit;
 use strapd_attitude::setting::ACCEL_AXES;
 
 /// A meaning explains what a unit might when its median error is below this share of the other's.
 const FOLLOWS: f64 = 0.5;
+/// Share by which a ratio of turns may be off that of two units: noise of the reference, and what goes to and fro.
+const SAME_UNIT: f64 = 0.15;
 /// A unit explains better what a meaning would as well when it is off by less than this share of what that leaves.
 const CLOSER: f64 = 0.3;
 /// Share by which the gyro may turn farther than an orientation that its scale agrees with.
@@ -86,7 +89,7 @@ pub(super) fn shifted(shift: &TimeShift) -> Finding {
 pub(in crate::findings) fn other_scale(summary: &TopicSummary) -> Option<Finding> {
     let recorded = summary.recorded?;
     let found = recorded.turn_ratio?;
-    let is_one = recorded.unit.is_none() && found.spread < ONE_FACTOR;
+    let is_one = unit_by(&recorded).is_none() && found.spread < ONE_FACTOR;
     let is_other = is_one && !witness(summary).agrees_in_scale && !is_of_meaning(summary)?;
     is_other.then(|| sensors::of_ratio(found.ratio, recorded.gyro_scale))
 }
@@ -97,16 +100,28 @@ fn is_of_meaning(summary: &TopicSummary) -> Option<bool> {
     Some(best.median_deg < FOLLOWS * used(summary)?.median_deg)
 }
 
+/// Unit by which the rates turn as far as the orientation, to a share that is left, where it is not the one they were taken
+/// in. Rates that were scaled as well are of no unit.
+fn unit_by(recorded: &Recorded) -> Option<(GyroUnit, f64)> {
+    let found = recorded.turn_ratio?;
+    let taken = recorded.gyro_unit;
+    let off = |unit: GyroUnit| (found.ratio * unit.to_rad() / taken.to_rad() - 1.0).abs();
+    let unit = GyroUnit::ALL
+        .into_iter()
+        .find(|unit| off(*unit) < SAME_UNIT)?;
+    (unit != taken && recorded.gyro_scale == [1.0; 3]).then(|| (unit, off(unit)))
+}
+
 /// Finding that the rates are of another unit, where a recorded orientation shows it and no meaning of a sample would as
 /// well: at 57 Hz an angle a sample is about a rate in degrees.
 pub(in crate::findings) fn other_unit(summary: &TopicSummary) -> Option<Finding> {
-    let recorded = summary.recorded?;
-    let OtherUnit { unit, taken, off } = recorded.unit?;
+    let recorded = summary.recorded.as_ref()?;
+    let (unit, off) = unit_by(recorded)?;
     let is_closer = || {
         let best = best_meaning(&summary.against)?;
         let left = best.median_deg.to_radians() / recorded.bias?.turn;
         Some(off < CLOSER * left)
     };
     let is_told = !is_of_meaning(summary)? || is_closer() == Some(true);
-    is_told.then(|| sensors::of_unit(unit, taken))
+    is_told.then(|| sensors::of_unit(unit, recorded.gyro_unit))
 }
