@@ -512,7 +512,11 @@ fn foxgloves_own_client_reads_every_attitude_as_it_stands_in_the_lines() {
     let info = &said[0];
     assert_eq!(info["protocol"], "foxglove.websocket.v1");
     assert_eq!(info["capabilities"], json!(["time"]));
-    let status = said.iter().find(|v| v["op"] == "status").unwrap();
+    let status = said.iter().find(|v| v["op"] == "status");
+    let status = status.unwrap_or_else(|| {
+        let rest: Vec<_> = said.iter().filter(|v| !v["op"].is_null()).collect();
+        unreachable!("no answer to getParameters: {rest:?}")
+    });
     assert!(
         status["message"]
             .as_str()
