@@ -60,7 +60,10 @@ fn keys_change_the_view_and_nothing_else() {
     key(&mut browser, " ");
     assert_eq!(browser.text("pause"), "Go on space");
     turn(&mut sender, 500, 600);
-    browser.until("the daemon goes on", "window.arrived === 599");
+    browser.until(
+        "the daemon goes on",
+        "window.arrived === 599 && document.querySelector('[data-testid=sensor-rate]').textContent !== '–'",
+    );
     assert_eq!(browser.eval("__strapd.seq"), 499);
     key(&mut browser, " ");
     turn(&mut sender, 600, 700);
