@@ -135,6 +135,30 @@ fn words_are_the_names_of_what_they_set_and_none_is_left_out() {
 }
 
 #[test]
+fn units_are_taken_as_they_are_written_elsewhere_and_no_spelling_means_two_words() {
+    for (spelling, unit) in [
+        ("rad/s", GyroUnit::Rad),
+        ("deg/s", GyroUnit::Deg),
+        ("dps", GyroUnit::Deg),
+        ("DPS", GyroUnit::Deg),
+        ("mrad/s", GyroUnit::Mrad),
+    ] {
+        let mut plan = defaults();
+        put(&mut plan, &[("gyro_unit", spelling)]).unwrap();
+        assert_eq!(plan.unit, Some(unit), "{spelling}");
+    }
+    for row in &ROWS {
+        let mut spellings = BTreeSet::new();
+        for word in row.words {
+            for spelling in std::iter::once(&word.name).chain(word.also) {
+                let is_new = spellings.insert(spelling.to_lowercase());
+                assert!(is_new, "{}: {spelling} twice", row.name());
+            }
+        }
+    }
+}
+
+#[test]
 fn a_range_is_that_of_the_check() {
     for row in &ROWS {
         let Takes::Number { range, .. } = row.takes else {
