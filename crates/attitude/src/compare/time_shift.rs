@@ -151,13 +151,18 @@ mod tests {
 
     /// A minute at 100 Hz of a body that turns every way, `late` ns late, in a world of its own where it is another's.
     fn track(late: i64, world: f64, noise: f64) -> Vec<Stamped> {
+        turning(1.1, late, world, noise)
+    }
+
+    /// The same at up to this rate, rad/s about each axis.
+    fn turning(most: f64, late: i64, world: f64, noise: f64) -> Vec<Stamped> {
         let mut q: Quaternion<Nav, Body> =
             Quaternion::from_rotation_vector(&RotationVector(Vector3::new(0.3, -0.2, 1.0) * world));
         (0..6000_i64)
             .map(|n| {
                 let t = n as f64 * 0.01;
                 let rate = Vector3::new((1.3 * t).sin(), (0.71 * t).cos(), (2.17 * t).sin());
-                q = q.advanced(&RotationVector(rate * (1.1 * (0.37 * t).sin() * 0.01)));
+                q = q.advanced(&RotationVector(rate * (most * (0.37 * t).sin() * 0.01)));
                 let of = |k: f64| noise * (k * n as f64).sin();
                 let off = RotationVector(Vector3::new(of(91.7), of(57.3), of(123.1)));
                 (Nanos(n * 10_000_000 + late), q.advanced(&off).normalised())
@@ -195,5 +200,23 @@ mod tests {
         assert_eq!(fit_time_shift(&estimate, &still), None);
         assert_eq!(fit_time_shift(&still, &estimate), None);
         assert_eq!(fit_time_shift(&[], &estimate), None);
+    }
+
+    #[test]
+    fn no_shift_is_claimed_of_four_seconds_of_what_explains_little_and_of_about_a_spacing() {
+        let estimate = track(0, 0.0, 0.0);
+        let late = track(300_000_000, 1.0, 0.0);
+        assert!(fit_time_shift(&estimate, &late[..600]).is_some());
+        assert_eq!(fit_time_shift(&estimate, &late[..400]), None);
+        // As late, and so slow that an error over a second is a few mrad.
+        let slow = |late| turning(0.005, late, 0.0, 0.0);
+        assert_eq!(fit_time_shift(&slow(0), &slow(300_000_000)), None);
+        // Of 20 Hz little more than from one sample to the next.
+        let sparse: Vec<Stamped> = estimate.iter().step_by(5).copied().collect();
+        let found = fit_time_shift(&sparse, &late).unwrap();
+        assert!((found.late_secs - 0.3).abs() < 5e-3, "{found:?}");
+        for little in [-60_000_000, 60_000_000] {
+            assert_eq!(fit_time_shift(&sparse, &track(little, 1.0, 0.0)), None);
+        }
     }
 }

@@ -121,6 +121,17 @@ mod tests {
             .collect()
     }
 
+    /// A minute at 100 Hz of a body that turns about one axis at this rate, rad/s.
+    fn turning(rate: f64) -> Vec<Stamped> {
+        let about = |t: f64| RotationVector(Vector3::new(0.6, 0.0, 0.8) * (rate * t));
+        (0..6000_i64)
+            .map(|n| {
+                let q = Quaternion::from_rotation_vector(&about(n as f64 * 0.01));
+                (Nanos(n * 10_000_000), q)
+            })
+            .collect()
+    }
+
     #[test]
     fn a_factor_of_the_rates_is_found_either_way_under_the_noise_of_a_reference() {
         let reference = track(1.0, 2e-3);
@@ -151,5 +162,11 @@ mod tests {
         assert_eq!(turn_ratio(&later, &reference), None);
         // Two rad and more in each step.
         assert_eq!(turn_ratio(&track(400.0, 0.0), &reference), None);
+        // Four rad in each step look like 2.3 the other way, each time.
+        let one = turning(1.0);
+        assert!((turn_ratio(&turning(150.0), &one).unwrap().ratio / 150.0 - 1.0).abs() < 1e-3);
+        assert_eq!(turn_ratio(&turning(400.0), &one), None);
+        // Two drifts: no motion.
+        assert_eq!(turn_ratio(&turning(0.1), &turning(0.05)), None);
     }
 }
