@@ -411,6 +411,12 @@ mod tests {
         }
         let found = judged(&tilted, Align::Heading);
         assert!(found.tilt.inside < 0.5, "{found:?}");
+        // Nor the sigma of a first tilt, which an alignment by the heading leaves as it is.
+        if let Some(first) = tilted.first_mut() {
+            first.covariance = about_the_vertical(0.3, 0.3, &first.q_nb);
+        }
+        let found = judged(&tilted, Align::FirstHeading);
+        assert!(found.tilt.inside < 0.5, "{found:?}");
     }
 
     #[test]

@@ -145,6 +145,22 @@ mod tests {
     }
 
     #[test]
+    fn what_rests_for_half_of_the_time_is_told_by_the_other_half() {
+        let moving = track(1.0, 0.0);
+        let half = |noise: f64| -> Vec<Stamped> {
+            let noisy = track(1.0, noise);
+            let rows = moving.iter().zip(noisy).enumerate();
+            rows.map(|(n, ((t, q), (_, off)))| match n < 3000 {
+                true => (*t, *q),
+                false => (*t, Quaternion::identity() * (q.inverse() * off)),
+            })
+            .collect()
+        };
+        let found = turn_ratio(&half(1e-3), &half(0.03)).unwrap();
+        assert!((found.ratio - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
     fn nothing_is_told_of_what_does_not_turn_of_another_motion_and_of_what_goes_round() {
         let reference = track(1.0, 0.0);
         let still: Vec<Stamped> = reference
